@@ -1,0 +1,37 @@
+"""A finished frame in CPU memory: named layers, the camera that saw them and what the render cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.scene.camera import Camera
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Film:
+    """One frame.
+
+    layers: name → (height, width, channels) float32, first row at the top; channels as image.layers.LAYERS says.
+    camera: conformed to the image's aspect.
+    scene_name: the stage's file name without suffix; frame: time code, None for the default time.
+    samples: a pixel.
+    metadata: further facts for the file's header and `--stats`, JSON-like values.
+    """
+
+    layers: dict[str, NDArray[np.float32]]
+    camera: Camera
+    scene_name: str
+    frame: float | None = None
+    frames_per_second: float = 24.0
+    samples: int = 1
+    metadata: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) in pixels."""
+        height, width = next(iter(self.layers.values())).shape[:2]
+        return width, height

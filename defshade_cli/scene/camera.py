@@ -1,0 +1,65 @@
+"""The camera: a rigid frame, a window and a depth range."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.scene.arrays import frozen
+from defshade_cli.spaces import ConformPolicy, Matrix, Window, conform_window
+
+Projection = Literal["perspective", "orthographic"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """A camera as UsdGeomCamera describes it, in scene units.
+
+    path: prim path, or a name in angle brackets for a camera of ours.
+    world_from_camera: (4, 4) float64, rigid.
+    window: (left, right, bottom, top) of the image on the plane one unit ahead (perspective: tangents of the
+        view angles; orthographic: scene units).
+    clipping_range: (near, far), 0 < near < far in perspective.
+    exposure: linear scale of the camera's exposure attributes (UsdGeomCamera.ComputeLinearExposureScale).
+    f_stop, focus_distance, focal_length: lens; f_stop 0 is a pinhole.
+    shutter: (open, close) in time codes around the frame.
+    """
+
+    path: str
+    world_from_camera: Matrix
+    window: Window
+    projection: Projection = "perspective"
+    clipping_range: tuple[float, float] = (1.0, 1.0e6)
+    exposure: float = 1.0
+    f_stop: float = 0.0
+    focus_distance: float = 0.0
+    focal_length: float = 0.0
+    shutter: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "world_from_camera", frozen(self.world_from_camera, np.float64, 4, 4))
+
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """(3,) the eye in world space."""
+        return self.world_from_camera[:3, 3]
+
+    @property
+    def camera_from_world(self) -> Matrix:
+        rotation = self.world_from_camera[:3, :3].T
+        inverse = np.eye(4)
+        inverse[:3, :3] = rotation
+        inverse[:3, 3] = -rotation @ self.position
+        return inverse
+
+    @property
+    def aspect(self) -> float:
+        left, right, bottom, top = self.window
+        return (right - left) / (top - bottom)
+
+    def conformed(self, aspect: float, policy: ConformPolicy = "expandAperture") -> Camera:
+        """This camera with its window fitted to an image of `aspect`."""
+        return replace(self, window=conform_window(self.window, aspect, policy))

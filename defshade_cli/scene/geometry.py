@@ -1,0 +1,100 @@
+"""Geometry: meshes in object space, and the drawables that place them in the world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.scene.arrays import frozen
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles of one prim, ready to draw; compared by identity, so an unchanged mesh is not uploaded again.
+
+    path: prim path, for messages.
+    points: (V, 3) float32, object space.
+    normals: (V, 3) float32, unit, object space; they agree with the winding.
+    triangles: (T, 3) uint32 into points, counter-clockwise seen from outside whatever the prim's orientation.
+    faces: (T,) int32, the authored face that each triangle is part of.
+    display_color: (V, 3) float32, scene-linear, where it varies over the mesh; else None and the drawable has it.
+    display_opacity: (V,) float32 likewise.
+    double_sided: as authored. Both sides are drawn either way.
+    """
+
+    path: str
+    points: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    triangles: NDArray[np.uint32]
+    faces: NDArray[np.int32]
+    display_color: NDArray[np.float32] | None = None
+    display_opacity: NDArray[np.float32] | None = None
+    double_sided: bool = False
+
+    def __post_init__(self) -> None:
+        count = len(self.points)
+        freeze = object.__setattr__
+        freeze(self, "points", frozen(self.points, np.float32, count, 3))
+        freeze(self, "normals", frozen(self.normals, np.float32, count, 3))
+        freeze(self, "triangles", frozen(self.triangles, np.uint32, -1, 3))
+        freeze(self, "faces", frozen(self.faces, np.int32, len(self.triangles)))
+        if self.display_color is not None:
+            freeze(self, "display_color", frozen(self.display_color, np.float32, count, 3))
+        if self.display_opacity is not None:
+            freeze(self, "display_opacity", frozen(self.display_opacity, np.float32, count))
+
+    @cached_property
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 3) least and greatest corner of the drawn points, object space; NaN points do not count."""
+        used = self.points[np.unique(self.triangles)] if len(self.triangles) else self.points[:0]
+        used = used[np.isfinite(used).all(axis=1)].astype(np.float64)
+        if not len(used):
+            return np.array([[np.inf] * 3, [-np.inf] * 3])
+        return np.stack([used.min(axis=0), used.max(axis=0)])
+
+
+@dataclass(frozen=True, slots=True)
+class Subset:
+    """A run of a mesh's triangles with one material.
+
+    material: index into Scene.materials.
+    first, count: triangles. Subsets of a drawable do not overlap; what none covers is not drawn.
+    """
+
+    material: int
+    first: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawable:
+    """A mesh placed N times.
+
+    mesh: index into Scene.meshes.
+    world_from_object: (N, 4, 4) float64; mirrored and sheared matrices are allowed.
+    subsets: the materials, in order of first triangle.
+    paths: prim path of each instance, or one path that all share (a PointInstancer's prototype).
+    instance_ids: (N,) int32, PointInstancer ids or instance order; −1 for what is not instanced.
+    display_color, display_opacity: (N, 3) and (N,) float32, scene-linear; a varying colour of the mesh replaces them.
+    """
+
+    mesh: int
+    world_from_object: NDArray[np.float64]
+    subsets: tuple[Subset, ...]
+    paths: tuple[str, ...]
+    instance_ids: NDArray[np.int32] = field(default_factory=lambda: np.full(1, -1, np.int32))
+    display_color: NDArray[np.float32] = field(default_factory=lambda: np.full((1, 3), 0.18, np.float32))
+    display_opacity: NDArray[np.float32] = field(default_factory=lambda: np.ones(1, np.float32))
+
+    def __post_init__(self) -> None:
+        count = len(self.world_from_object)
+        if len(self.paths) not in (1, count):
+            raise ValueError(f"{len(self.paths)} paths for {count} instances")
+        freeze = object.__setattr__
+        freeze(self, "world_from_object", frozen(self.world_from_object, np.float64, count, 4, 4))
+        freeze(self, "instance_ids", frozen(self.instance_ids, np.int32, count))
+        freeze(self, "display_color", frozen(self.display_color, np.float32, count, 3))
+        freeze(self, "display_opacity", frozen(self.display_opacity, np.float32, count))

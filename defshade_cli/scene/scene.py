@@ -1,0 +1,70 @@
+"""One frame of a stage: everything a renderer needs to know, in NumPy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.geometry import Drawable, Mesh
+from defshade_cli.scene.light import Light
+from defshade_cli.scene.material import Material
+
+
+@dataclass(frozen=True, slots=True)
+class Unsupported:
+    """A prim, or a part of one, that is left out of the picture, and why in a few words."""
+
+    path: str
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A stage at one time code, in world space and scene units.
+
+    camera: the one to render; cameras: the paths of all that the stage has.
+    frame: time code, None for the default time.
+    """
+
+    name: str
+    meshes: tuple[Mesh, ...]
+    drawables: tuple[Drawable, ...]
+    materials: tuple[Material, ...]
+    lights: tuple[Light, ...]
+    camera: Camera
+    cameras: tuple[str, ...] = ()
+    unsupported: tuple[Unsupported, ...] = ()
+    meters_per_unit: float = 0.01
+    up_axis: str = "Y"
+    frame: float | None = None
+    frames_per_second: float = 24.0
+
+    @cached_property
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 3) world-space box around every drawable; (+inf, −inf) for a scene without geometry."""
+        corners = [self._world_corners(drawable) for drawable in self.drawables]
+        corners = [c[np.isfinite(c).all(axis=1)] for c in corners]
+        corners = [c for c in corners if len(c)]
+        if not corners:
+            return np.array([[np.inf] * 3, [-np.inf] * 3])
+        return np.stack([np.min([c.min(0) for c in corners], 0), np.max([c.max(0) for c in corners], 0)])
+
+    def _world_corners(self, drawable: Drawable) -> NDArray[np.float64]:
+        box = np.array(list(product(*self.meshes[drawable.mesh].bounds.T)))
+        if not np.isfinite(box).all():
+            return np.empty((0, 3))
+        linear, offset = drawable.world_from_object[:, :3, :3], drawable.world_from_object[:, None, :3, 3]
+        return (np.einsum("nij,kj->nki", linear, box) + offset).reshape(-1, 3)
+
+    @cached_property
+    def triangle_count(self) -> int:
+        """Triangles drawn, every instance counted."""
+        return sum(
+            sum(subset.count for subset in drawable.subsets) * len(drawable.world_from_object)
+            for drawable in self.drawables
+        )

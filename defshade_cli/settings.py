@@ -1,0 +1,75 @@
+"""What the user asked for, frozen: a RenderJob is one stage, its frames, its outputs and the RenderSettings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+Layout = Literal["rgba8", "packed", "float"]
+Shading = Literal["preview-surface", "classic"]
+Existing = Literal["overwrite", "skip", "error"]
+Compression = Literal["zip", "zips", "piz", "dwaa", "none"]
+
+LAYOUTS: tuple[Layout, ...] = ("rgba8", "packed", "float")
+SHADINGS: tuple[Shading, ...] = ("preview-surface", "classic")
+EXISTING: tuple[Existing, ...] = ("overwrite", "skip", "error")
+COMPRESSIONS: tuple[Compression, ...] = ("zip", "zips", "piz", "dwaa", "none")
+PURPOSES = ("default", "render", "proxy", "guide")
+
+
+@dataclass(frozen=True, slots=True)
+class RenderSettings:
+    """How a frame is made. Everything here changes pixels; nothing here names a file.
+
+    size: (width, height) in pixels; None follows the stage's RenderSettings, then 1920x1080.
+    width: pixels; the height then follows the camera's aspect. At most one of size and width is given.
+    samples: jittered samples a pixel; 1 is a sample at the pixel's centre.
+    exposure: stops added to the camera's own.
+    light_tolerance: scene-linear value that all dropped light together may reach in one pixel.
+    """
+
+    size: tuple[int, int] | None = None
+    width: int | None = None
+    samples: int = 1
+    layout: Layout = "float"
+    shading: Shading = "preview-surface"
+    layers: tuple[str, ...] = ("beauty",)
+    exposure: float = 0.0
+    purposes: tuple[str, ...] = ("default", "render")
+    light_tolerance: float = 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class OutputSettings:
+    """How a film becomes files.
+
+    patterns: file names with frame and name tokens; the suffix picks the format. One file per pattern and frame.
+    display, view: of the OCIO config, for display-referred formats; None takes the config's default.
+    full_float: 32-bit channels in EXR in place of half (data layers are always 32-bit).
+    """
+
+    patterns: tuple[str, ...] = ()
+    existing: Existing = "overwrite"
+    display: str | None = None
+    view: str | None = None
+    full_float: bool = False
+    compression: Compression = "zip"
+    split_layers: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class RenderJob:
+    """One stage rendered over frames.
+
+    frames: USD time codes; empty means the default time (for a stage without samples, the same thing).
+    camera: prim path or name; None picks by the rule in usd/camera.py.
+    device: EGL device index, None for the driver's default.
+    """
+
+    stage: Path
+    frames: tuple[float, ...] = ()
+    camera: str | None = None
+    settings: RenderSettings = field(default_factory=RenderSettings)
+    output: OutputSettings = field(default_factory=OutputSettings)
+    device: int | None = None

@@ -1,0 +1,77 @@
+"""Frames and the matrices between them.
+
+Matrices are named `b_from_a`, act on column vectors (`p_b = b_from_a @ p_a`) and stay float64 on the CPU.
+
+    object    a mesh's own points
+    world     the stage: its up axis and units as authored
+    relative  world axes with the origin at the camera: what the GPU sees, so that a scene 10^7 units
+              from the origin renders like one at the origin
+    camera    right-handed, +X right, +Y up, looking along −Z
+    clip      before the divide; x, y in [−w, w], y up
+    raster    pixels, (0, 0) at the top-left corner of the image, y down
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Matrix = NDArray[np.float64]
+Window = tuple[float, float, float, float]
+ConformPolicy = Literal["expandAperture", "cropAperture", "adjustApertureWidth", "adjustApertureHeight"]
+
+
+def translation(offset: NDArray) -> Matrix:
+    """(4, 4) matrix that adds `offset` (3,)."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = offset
+    return matrix
+
+
+def transform_points(b_from_a: Matrix, points: NDArray) -> NDArray[np.float64]:
+    """Points (..., 3) of frame a in frame b; affine matrices only."""
+    return points @ b_from_a[:3, :3].T + b_from_a[:3, 3]
+
+
+def transform_directions(b_from_a: Matrix, directions: NDArray) -> NDArray[np.float64]:
+    """Directions (..., 3), not renormalised."""
+    return directions @ b_from_a[:3, :3].T
+
+
+def normalize(vectors: NDArray) -> NDArray:
+    """Unit vectors (..., 3) of the same dtype; a zero vector stays zero."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+
+
+def rigid(matrix: Matrix) -> Matrix:
+    """The nearest rotation (polar decomposition, by SVD) with the matrix's translation: a camera ignores scale and shear."""
+    u, _, vt = np.linalg.svd(matrix[:3, :3])
+    rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    result = np.eye(4)
+    result[:3, :3] = rotation
+    result[:3, 3] = matrix[:3, 3]
+    return result
+
+
+def conform_window(window: Window, aspect: float, policy: ConformPolicy = "expandAperture") -> Window:
+    """Fit (left, right, bottom, top) to the image's aspect as UsdRenderSettings' aspectRatioConformPolicy says.
+
+    The window keeps its centre, so aperture offsets survive.
+    """
+    left, right, bottom, top = window
+    width, height = right - left, top - bottom
+    too_narrow = width / height < aspect
+    fit_width = {
+        "expandAperture": too_narrow,
+        "cropAperture": not too_narrow,
+        "adjustApertureWidth": True,
+        "adjustApertureHeight": False,
+    }[policy]
+    if fit_width:
+        half, centre = 0.5 * height * aspect, 0.5 * (left + right)
+        return centre - half, centre + half, bottom, top
+    half, centre = 0.5 * width / aspect, 0.5 * (bottom + top)
+    return left, right, centre - half, centre + half
