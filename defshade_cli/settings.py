@@ -62,13 +62,13 @@ class OutputSettings:
 class RenderJob:
     """One stage rendered over frames.
 
-    frames: USD time codes; empty means the default time (for a stage without samples, the same thing).
+    frames: USD time codes, None standing for the default time; empty means the stage's first frame.
     camera: prim path or name; None picks by the rule in usd/camera.py.
     device: EGL device index, None for the driver's default.
     """
 
     stage: Path
-    frames: tuple[float, ...] = ()
+    frames: tuple[float | None, ...] = ()
     camera: str | None = None
     settings: RenderSettings = field(default_factory=RenderSettings)
     output: OutputSettings = field(default_factory=OutputSettings)

@@ -13,6 +13,7 @@ from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import Material
+from defshade_cli.spaces import ConformPolicy
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +30,7 @@ class Scene:
 
     camera: the one to render; cameras: the paths of all that the stage has.
     frame: time code, None for the default time.
+    resolution, pixel_aspect, conform: of the stage's UsdRenderSettings, where it names one.
     """
 
     name: str
@@ -43,6 +45,9 @@ class Scene:
     up_axis: str = "Y"
     frame: float | None = None
     frames_per_second: float = 24.0
+    resolution: tuple[int, int] | None = None
+    pixel_aspect: float = 1.0
+    conform: ConformPolicy = "expandAperture"
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
