@@ -1,0 +1,137 @@
+"""The two reflection models in float64: what shaders/lib/brdf.glsl must agree with.
+
+Written from the formulas of docs/lighting.md, not from the shader. Directions are unit vectors (..., 3) away
+from the surface, cosines are (...,), colours are (..., 3); everything broadcasts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.settings import Shading
+from defshade_cli.spaces import normalize
+
+Array = NDArray[np.float64]
+
+MIN_ALPHA = 1e-4
+"""Least GGX alpha: roughness 0 is a delta that no point light can hit, so it means roughness 0.01."""
+MIN_NOV = 1e-4
+COAT_F0 = 0.04
+"""Normal reflectance of the clearcoat: ior 1.5 whatever the base's ior is."""
+CLASSIC_DIELECTRIC_F0 = 0.03
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """P shaded points, all arrays float64.
+
+    position, normal, view: (P, 3) world space; normal unit and facing the camera, view unit towards the eye.
+    base, f0, f90, emission: (P, 3) scene-linear; f0 and f90 are preview-surface's, classic derives its own.
+    metallic, roughness, clearcoat, clearcoat_roughness: (P,) 0..1.
+    """
+
+    position: Array
+    normal: Array
+    view: Array
+    base: Array
+    metallic: Array
+    roughness: Array
+    f0: Array
+    f90: Array
+    clearcoat: Array
+    clearcoat_roughness: Array
+    emission: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Angles:
+    """(P,) cosines between the normal, view, light and half vector; nol is negative below the horizon."""
+
+    nov: Array
+    nol: Array
+    noh: Array
+    voh: Array
+
+    @classmethod
+    def between(cls, n: Array, v: Array, l: Array) -> Angles:  # noqa: E741
+        h = normalize(v + l)
+        return cls(np.maximum(_dot(n, v), MIN_NOV), _dot(n, l), _dot(n, h), _dot(v, h))
+
+
+def alpha_from_roughness(roughness: Array) -> Array:
+    """GGX alpha = roughness², as UsdPreviewSurface's schema suggests."""
+    return np.maximum(np.square(roughness), MIN_ALPHA)
+
+
+def D_GGX(alpha: Array, noh: Array) -> Array:
+    """Walter et al. 2007, "Microfacet Models for Refraction", eq. 33; ∫ D NoH dh = 1."""
+    a2 = np.square(alpha)
+    return a2 / (np.pi * np.square(np.square(noh) * (a2 - 1.0) + 1.0))
+
+
+def V_SmithGGXCorrelated(nov: Array, nol: Array, alpha: Array) -> Array:
+    """Heitz 2014, "Understanding the Masking-Shadowing Function", eq. 99: G2 / (4 NoV NoL)."""
+    a2 = np.square(alpha)
+    lambda_v = nol * np.sqrt(np.square(nov) * (1.0 - a2) + a2)
+    lambda_l = nov * np.sqrt(np.square(nol) * (1.0 - a2) + a2)
+    return 0.5 / (lambda_v + lambda_l)
+
+
+def G1_SchlickSmith(cosine: Array, k: Array) -> Array:
+    """Schlick 1994, "An Inexpensive BRDF Model", eq. 19; k = alpha / 2 fits Smith's term for GGX."""
+    return cosine / (cosine * (1.0 - k) + k)
+
+
+def F_Schlick(f0: Array | float, f90: Array | float, voh: Array) -> Array:
+    """Schlick 1994, eq. 15, with the edge colour `f90`; the cosine gains a trailing axis for colours."""
+    return f0 + (f90 - f0) * np.power(1.0 - voh[..., None], 5)
+
+
+def evaluate_brdf(
+    surface: Surface, light_direction: Array, response: tuple[float, float] = (1.0, 1.0), *, shading: Shading
+) -> Array:
+    """(P, 3) f · NoL, zero below the horizon; `response` multiplies the diffuse and the specular part."""
+    angles = Angles.between(surface.normal, surface.view, light_direction)
+    model = preview_surface if shading == "preview-surface" else classic
+    lit = angles.nol > 0.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reflected = model(surface, angles, response) * angles.nol[..., None]
+    return np.where(lit[..., None], reflected, 0.0)
+
+
+def preview_surface(surface: Surface, angles: Angles, response: tuple[float, float]) -> Array:
+    """UsdPreviewSurface: Lambert under a GGX lobe, both under an optional white coat."""
+    fresnel = F_Schlick(surface.f0, surface.f90, angles.voh)
+    specular = _microfacets(surface.roughness, angles)[..., None] * fresnel
+    albedo = surface.base * (1.0 - surface.metallic[..., None])
+    diffuse = albedo / np.pi * (1.0 - fresnel)
+
+    coat_fresnel = surface.clearcoat[..., None] * F_Schlick(COAT_F0, 1.0, angles.voh)
+    coat = _microfacets(surface.clearcoat_roughness, angles)[..., None] * coat_fresnel
+    return (diffuse * response[0] + specular * response[1]) * (1.0 - coat_fresnel) + coat * response[1]
+
+
+def classic(surface: Surface, angles: Angles, response: tuple[float, float]) -> Array:
+    """The model this project started from, with its three defects mended: see docs/lighting.md."""
+    metallic = surface.metallic[..., None]
+    real_albedo = surface.base - surface.base * metallic
+    real_specular = (1.0 - metallic) * CLASSIC_DIELECTRIC_F0 + metallic * surface.base
+
+    alpha = alpha_from_roughness(surface.roughness)
+    geometry = G1_SchlickSmith(angles.nov, alpha / 2.0) * G1_SchlickSmith(angles.nol, alpha / 2.0)
+    lobe = D_GGX(alpha, angles.noh) * geometry / (4.0 * angles.nol * angles.nov)
+    specular = lobe[..., None] * F_Schlick(real_specular, 1.0, angles.voh)
+    diffuse = real_albedo / np.pi * np.maximum(1.0 - specular, 0.0)
+    return diffuse * response[0] + specular * response[1]
+
+
+def _microfacets(roughness: Array, angles: Angles) -> Array:
+    alpha = alpha_from_roughness(roughness)
+    return D_GGX(alpha, angles.noh) * V_SmithGGXCorrelated(angles.nov, angles.nol, alpha)
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.sum(a * b, axis=-1)
