@@ -1,0 +1,136 @@
+"""A headless OpenGL context through EGL.
+
+Clip space is set once for the whole context: origin at the upper left, so that row 0 of every target is the top
+of the image, and depth in [0, 1], which reversed-Z needs. moderngl has no glClipControl and no 32-bit float depth
+texture; both are reached through eglGetProcAddress.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+import moderngl
+
+from defshade_cli.errors import GpuError
+from defshade_cli.gpu.shaders import ShaderLibrary
+
+INSTALL_HINT = "apt-get install --no-install-recommends libegl1 libgl1 libgl1-mesa-dri"
+LIBGL = os.environ.get("DEFSHADE_LIBGL", "libGL.so.1")
+LIBEGL = os.environ.get("DEFSHADE_LIBEGL", "libEGL.so.1")
+
+_REQUIRED_VERSION = 450
+_UPPER_LEFT, _ZERO_TO_ONE = 0x8CA2, 0x935F
+_TEXTURE_2D, _DEPTH_COMPONENT, _DEPTH_COMPONENT32F, _FLOAT = 0x0DE1, 0x1902, 0x8CAC, 0x1406
+DEPTH_CLAMP = 0x864F
+
+Releasable = TypeVar("Releasable", bound=Any)
+
+
+class Gpu:
+    """One context and everything made in it; a context manager.
+
+    Raises GpuError where there is no EGL, no such device, or a driver below OpenGL 4.5.
+    """
+
+    def __init__(self, device: int | None = None) -> None:
+        self.context = _create_context(device)
+        self._stack = ExitStack()
+        self._stack.callback(self.context.release)
+        if self.context.version_code < _REQUIRED_VERSION:
+            raise GpuError(f"OpenGL 4.5 is needed; {self.renderer} has {self.context.version_code / 100:.1f}")
+        self._get_address = _egl_get_proc_address()
+        self._entry_point("glClipControl", ctypes.c_uint, ctypes.c_uint)(_UPPER_LEFT, _ZERO_TO_ONE)
+        self.shaders = ShaderLibrary(self.context)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._stack.close()
+
+    @property
+    def renderer(self) -> str:
+        """The driver's own name for the device."""
+        return str(self.context.info["GL_RENDERER"])
+
+    @property
+    def is_software(self) -> bool:
+        return "llvmpipe" in self.renderer
+
+    @property
+    def max_size(self) -> int:
+        """Largest width or height of a target, pixels."""
+        return int(self.context.info["GL_MAX_TEXTURE_SIZE"])
+
+    def keep(self, resource: Releasable) -> Releasable:
+        """Release `resource` when this Gpu closes."""
+        self._stack.callback(resource.release)
+        return resource
+
+    def depth_texture(self, size: tuple[int, int]) -> moderngl.Texture:
+        """A 32-bit float depth texture of (width, height), sampled without comparison.
+
+        moderngl allocates 24-bit integer depth; the storage is specified anew under the same name.
+        """
+        texture = self.context.depth_texture(size)
+        bind = self._entry_point("glBindTexture", ctypes.c_uint, ctypes.c_uint)
+        specify = self._entry_point("glTexImage2D", *[ctypes.c_uint] * 2, *[ctypes.c_int] * 4, *[ctypes.c_uint] * 2, ctypes.c_void_p)
+        bind(_TEXTURE_2D, texture.glo)
+        specify(_TEXTURE_2D, 0, _DEPTH_COMPONENT32F, *size, 0, _DEPTH_COMPONENT, _FLOAT, None)
+        texture.compare_func = ""
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        return texture
+
+    def _entry_point(self, name: str, *arguments: Any) -> Callable[..., None]:
+        address = self._get_address(name.encode())
+        if not address:
+            raise GpuError(f"the driver of {self.renderer} lacks {name}")
+        return ctypes.CFUNCTYPE(None, *arguments)(address)
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """One EGL device as `defshade doctor` lists it."""
+
+    index: int
+    vendor: str
+    renderer: str
+    version: str
+    ok: bool
+    problem: str = ""
+
+
+def describe_devices(limit: int = 16) -> list[Device]:
+    """Every EGL device in order of its index, at most `limit`; one entry that says why where there is none."""
+    devices: list[Device] = []
+    for index in range(limit):
+        try:
+            with Gpu(index) as gpu:
+                info = gpu.context.info
+                devices.append(Device(index, info["GL_VENDOR"], info["GL_RENDERER"], info["GL_VERSION"], True))
+        except GpuError as error:
+            if not devices:
+                devices.append(Device(index, "", "", "", False, str(error)))
+            break
+    return devices
+
+
+def _create_context(device: int | None) -> moderngl.Context:
+    options: dict[str, Any] = {} if device is None else {"device_index": device}
+    try:
+        return moderngl.create_context(standalone=True, backend="egl", libgl=LIBGL, libegl=LIBEGL, **options)
+    except Exception as error:  # glcontext raises bare Exception, ValueError or ImportError by case
+        reason = str(error).rstrip(".")
+        raise GpuError(f"no OpenGL context through EGL ({reason}); on Debian or Ubuntu: {INSTALL_HINT}") from error
+
+
+def _egl_get_proc_address() -> Callable[[bytes], int | None]:
+    function = ctypes.CDLL(LIBEGL).eglGetProcAddress
+    function.restype, function.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
+    return function

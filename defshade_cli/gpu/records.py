@@ -1,0 +1,58 @@
+"""GLSL structs to NumPy dtypes: shaders/lib/records.glsl is the only definition of what both sides share.
+
+Layout: std430 (OpenGL 4.6 core §7.6.2.2). A vec3 aligns to 16 bytes and leaves room for a scalar behind it.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+import numpy as np
+
+from defshade_cli.resources import SHADERS
+
+_STRUCT = re.compile(r"struct\s+(\w+)\s*\{(.*?)\}\s*;", re.DOTALL)
+_FIELD = re.compile(r"^\s*(\w+)\s+(\w+)\s*;", re.MULTILINE)
+_COMMENT = re.compile(r"//[^\n]*")
+
+_TYPES: dict[str, tuple[np.dtype, int]] = {
+    "float": (np.dtype("f4"), 4),
+    "int": (np.dtype("i4"), 4),
+    "uint": (np.dtype("u4"), 4),
+    "vec2": (np.dtype(("f4", 2)), 8),
+    "vec3": (np.dtype(("f4", 3)), 16),
+    "vec4": (np.dtype(("f4", 4)), 16),
+    "uvec2": (np.dtype(("u4", 2)), 8),
+    "uvec4": (np.dtype(("u4", 4)), 16),
+    "mat4": (np.dtype(("f4", (4, 4))), 16),
+}
+
+
+@cache
+def record(name: str) -> np.dtype:
+    """The dtype of struct `name`; a mat4 field holds the transpose, since GLSL stores columns.
+
+    Raises KeyError for a struct or a field type that records.glsl or this table lacks.
+    """
+    return record_of(_structs()[name])
+
+
+def record_of(body: str) -> np.dtype:
+    """The std430 dtype of a struct's body."""
+    names, formats, offsets, end, alignment = [], [], [], 0, 4
+    for type_name, field_name in _FIELD.findall(_COMMENT.sub("", body)):
+        dtype, align = _TYPES[type_name]
+        offset = -(-end // align) * align
+        names.append(field_name)
+        formats.append(dtype)
+        offsets.append(offset)
+        end, alignment = offset + dtype.itemsize, max(alignment, align)
+    size = -(-end // alignment) * alignment
+    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
+
+
+@cache
+def _structs() -> dict[str, str]:
+    text = (SHADERS / "lib" / "records.glsl").read_text(encoding="utf-8")
+    return dict(_STRUCT.findall(_COMMENT.sub("", text)))

@@ -1,0 +1,160 @@
+"""A Scene's arrays in GPU buffers. What has not changed since the last frame is not uploaded again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.records import record
+from defshade_cli.scene.geometry import Drawable, Mesh
+from defshade_cli.scene.material import Material
+from defshade_cli.scene.scene import Scene
+
+VIEW, INSTANCES, MATERIALS, LIGHTS = range(4)
+"""Binding points of the storage buffers, as the shaders declare them."""
+
+_COMMAND = np.dtype([(name, "u4") for name in ("count", "instances", "first_index", "base_vertex", "base_instance")])
+
+
+class RecordBuffer:
+    """A storage buffer of records at one binding; it grows as it must."""
+
+    def __init__(self, gpu: Gpu, binding: int) -> None:
+        self._gpu, self._binding = gpu, binding
+        self._buffer = gpu.keep(gpu.context.buffer(reserve=256))
+
+    def write(self, records: NDArray) -> None:
+        """Upload `records` and bind the buffer."""
+        data = np.ascontiguousarray(records).tobytes()
+        if len(data) > self._buffer.size:
+            self._buffer.orphan(len(data))
+        self._buffer.write(data)
+        self._buffer.bind_to_storage_buffer(self._binding)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DrawList:
+    """All opaque geometry as one multi-draw.
+
+    vertices: (buffer, format, attribute names) triples as moderngl takes them; indices: 32-bit.
+    commands: the indirect buffer, one draw a subset, instanced.
+    """
+
+    vertices: tuple[tuple, ...]
+    indices: moderngl.Buffer
+    commands: moderngl.Buffer
+    color_varies: bool
+
+
+class GpuScene:
+    """Buffers for one scene after another, of the same Gpu."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._instances = RecordBuffer(gpu, INSTANCES)
+        self._materials = RecordBuffer(gpu, MATERIALS)
+        self._meshes: tuple[Mesh, ...] = ()
+        self._pool: list[moderngl.Buffer] = []
+        self._draws: list[moderngl.Buffer] = []
+
+    def update(self, scene: Scene) -> DrawList:
+        """Make the scene's geometry, placements and materials resident, relative to its camera."""
+        self._instances.write(instance_records(scene.drawables, scene.camera.position))
+        self._materials.write(material_records(scene.materials))
+        color_varies = any(m.display_color is not None or m.display_opacity is not None for m in scene.meshes)
+        if not _same(self._meshes, scene.meshes):
+            self._pool = self._replaced(self._pool, _vertex_arrays(scene.meshes, color_varies))
+            self._meshes = scene.meshes
+        commands, rows = draw_commands(scene.drawables, scene.meshes)
+        self._draws = self._replaced(self._draws, [commands, rows])
+        positions, normals, indices, *colors = self._pool
+        vertices = [(positions, "3f", "position_object"), (normals, "3f", "normal_object")]
+        vertices += [(buffer, "4f", "vertex_color") for buffer in colors]
+        vertices.append((self._draws[1], "2u4/i", "draw"))
+        return DrawList(tuple(vertices), indices, self._draws[0], color_varies)
+
+    def _replaced(self, old: list[moderngl.Buffer], arrays: Sequence[NDArray]) -> list[moderngl.Buffer]:
+        for buffer in old:
+            buffer.release()
+        return [self._gpu.context.buffer(np.ascontiguousarray(a).tobytes() or bytes(4)) for a in arrays]
+
+
+def instance_records(drawables: Sequence[Drawable], eye: NDArray[np.float64]) -> NDArray:
+    """One Instance record a placement, in the drawables' order; differences taken in float64."""
+    matrices = np.concatenate([d.world_from_object for d in drawables])
+    records = np.zeros(len(matrices), record("Instance"))
+    relative = matrices.copy()
+    relative[:, :3, 3] -= eye
+    records["relative_from_object"] = relative.transpose(0, 2, 1)
+    normal, handedness = _normal_matrices(matrices[:, :3, :3])
+    records["relative_from_normal"][:, :3, :3] = normal.transpose(0, 2, 1)
+    records["handedness"] = handedness
+    records["display_color"] = np.concatenate([d.display_color for d in drawables])
+    records["display_opacity"] = np.concatenate([d.display_opacity for d in drawables])
+    return records
+
+
+def _normal_matrices(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Cofactors scaled to unit size, with the determinant's sign: the inverse transpose that no singular matrix breaks."""
+    columns = linear.transpose(0, 2, 1) / np.maximum(np.abs(linear).max(axis=(1, 2)), np.finfo(float).tiny)[:, None, None]
+    x, y, z = columns[:, 0], columns[:, 1], columns[:, 2]
+    cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=-1)
+    handedness = np.where(np.einsum("ni,ni->n", x, cofactors[..., 0]) < 0, -1.0, 1.0)
+    size = np.maximum(np.abs(cofactors).max(axis=(1, 2)), np.finfo(float).tiny)
+    return cofactors * (handedness / size)[:, None, None], handedness
+
+
+def material_records(materials: Sequence[Material]) -> NDArray:
+    """One Material record each; fields of the same name are copied."""
+    dtype = record("Material")
+    records = np.zeros(len(materials), dtype)
+    for name in dtype.names or ():
+        records[name] = [getattr(material, name) for material in materials]
+    return records
+
+
+def draw_commands(drawables: Sequence[Drawable], meshes: Sequence[Mesh]) -> tuple[NDArray, NDArray[np.uint32]]:
+    """Indirect commands, one a subset, and the (instance, material) rows that their base instances point into."""
+    base_vertex = np.cumsum([0, *(len(m.points) for m in meshes)])
+    base_index = np.cumsum([0, *(3 * len(m.triangles) for m in meshes)])
+    commands, rows, first_instance, first_row = [], [], 0, 0
+    for drawable in drawables:
+        count = len(drawable.world_from_object)
+        for subset in drawable.subsets:
+            first_index = base_index[drawable.mesh] + 3 * subset.first
+            commands.append((3 * subset.count, count, first_index, base_vertex[drawable.mesh], first_row))
+            instances = np.arange(first_instance, first_instance + count, dtype=np.uint32)
+            rows.append(np.column_stack([instances, np.full(count, subset.material, np.uint32)]))
+            first_row += count
+        first_instance += count
+    return np.array(commands, _COMMAND), np.concatenate(rows) if rows else np.empty((0, 2), np.uint32)
+
+
+def _same(old: tuple[Mesh, ...], new: tuple[Mesh, ...]) -> bool:
+    return len(old) == len(new) and all(a is b for a, b in zip(old, new, strict=True))
+
+
+def _vertex_arrays(meshes: Sequence[Mesh], color_varies: bool) -> list[NDArray]:
+    arrays = [
+        np.concatenate([m.points for m in meshes]),
+        np.concatenate([m.normals for m in meshes]),
+        np.concatenate([m.triangles for m in meshes]),
+    ]
+    if color_varies:
+        arrays.append(np.concatenate([_vertex_colors(m) for m in meshes]))
+    return arrays
+
+
+def _vertex_colors(mesh: Mesh) -> NDArray[np.float32]:
+    """(V, 4) with −1 where the placement's own value counts."""
+    colors = np.full((len(mesh.points), 4), -1.0, np.float32)
+    if mesh.display_color is not None:
+        colors[:, :3] = mesh.display_color
+    if mesh.display_opacity is not None:
+        colors[:, 3] = mesh.display_opacity
+    return colors

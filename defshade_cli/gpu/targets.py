@@ -1,0 +1,67 @@
+"""Textures and framebuffers that passes draw into."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.errors import GpuError
+from defshade_cli.gpu.context import Gpu
+
+_READ_DTYPE = {"f1": np.uint8, "f2": np.float16, "f4": np.float32}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """A framebuffer with its colour textures by name and, where it has one, its depth."""
+
+    framebuffer: moderngl.Framebuffer
+    textures: dict[str, moderngl.Texture]
+    depth: moderngl.Texture | None
+
+    def read(self, name: str) -> NDArray:
+        """(height, width, components) in the texture's own type, row 0 at the top; uint8 for 8-bit planes."""
+        texture = self.textures[name]
+        return _as_image(texture, _READ_DTYPE[texture.dtype], texture.components)
+
+    def read_depth(self) -> NDArray[np.float32]:
+        """(height, width) as stored."""
+        assert self.depth is not None
+        return _as_image(self.depth, np.float32, 1)[..., 0]
+
+    def release(self) -> None:
+        """Free the framebuffer and its colour textures; a depth texture may be shared and is its maker's."""
+        self.framebuffer.release()
+        for texture in self.textures.values():
+            texture.release()
+
+
+def allocate(
+    gpu: Gpu,
+    size: tuple[int, int],
+    formats: Mapping[str, tuple[int, str]],
+    depth: moderngl.Texture | None = None,
+) -> Target:
+    """A target of (width, height) with one texture a name, each (components, dtype f1|f2|f4).
+
+    Raises GpuError where the size is past the driver's limit or memory ends.
+    """
+    if max(size) > gpu.max_size:
+        raise GpuError(f"{size[0]}x{size[1]} is past this driver's limit of {gpu.max_size} pixels a side")
+    try:
+        textures = {name: gpu.context.texture(size, n, dtype=dtype) for name, (n, dtype) in formats.items()}
+        framebuffer = gpu.context.framebuffer(list(textures.values()), depth)
+    except moderngl.Error as error:
+        raise GpuError(f"cannot allocate a target of {size[0]}x{size[1]}: {error}") from error
+    for texture in textures.values():
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+    return Target(framebuffer, textures, depth)
+
+
+def _as_image(texture: moderngl.Texture, dtype: type, components: int) -> NDArray:
+    width, height = texture.size
+    return np.frombuffer(texture.read(alignment=1), dtype).reshape(height, width, components)

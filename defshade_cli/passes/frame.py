@@ -1,0 +1,47 @@
+"""The targets of a frame, kept from one frame to the next while their size and format stay."""
+
+from __future__ import annotations
+
+from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.targets import Target, allocate
+from defshade_cli.passes.gbuffer import GBuffer, make_gbuffer
+from defshade_cli.passes.planes import Plane
+from defshade_cli.settings import Layout
+
+Size = tuple[int, int]
+
+
+class Frame:
+    """Hands out targets of one size; another size frees them all."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._size: Size = (0, 0)
+        self._gbuffers: dict[tuple[tuple[Plane, ...], Layout], GBuffer] = {}
+        self._radiance: dict[str, Target] = {}
+
+    def gbuffer(self, size: Size, planes: tuple[Plane, ...], layout: Layout) -> GBuffer:
+        """The GBuffer of (width, height) in a layout, as last drawn. Raises GpuError."""
+        self._resize(size)
+        if (planes, layout) not in self._gbuffers:
+            self._gbuffers[planes, layout] = make_gbuffer(self._gpu, size, planes, layout)
+        return self._gbuffers[planes, layout]
+
+    def radiance(self, name: str, size: Size, gbuffer: GBuffer | None = None) -> Target:
+        """A float RGBA target with one texture "radiance"; it tests against the depth of `gbuffer` where given."""
+        self._resize(size)
+        key = name if gbuffer is None else f"{name} {gbuffer.layout} {len(gbuffer.planes)}"
+        if key not in self._radiance:
+            depth = gbuffer.target.depth if gbuffer else None
+            self._radiance[key] = allocate(self._gpu, size, {"radiance": (4, "f4")}, depth)
+        return self._radiance[key]
+
+    def _resize(self, size: Size) -> None:
+        if size == self._size:
+            return
+        for target in [*self._radiance.values(), *(g.target for g in self._gbuffers.values())]:
+            target.release()
+        for gbuffer in self._gbuffers.values():
+            if gbuffer.target.depth:
+                gbuffer.target.depth.release()
+        self._radiance, self._gbuffers, self._size = {}, {}, size

@@ -1,0 +1,64 @@
+"""The GBuffer pass: opaque geometry into the planes, nearest surface wins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+
+from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.residence import DrawList
+from defshade_cli.gpu.targets import Target, allocate
+from defshade_cli.passes.planes import Plane, uses_standard_depth, write_source
+from defshade_cli.settings import Layout
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GBuffer:
+    """Planes and depth of one layout."""
+
+    target: Target
+    planes: tuple[Plane, ...]
+    layout: Layout
+
+
+def make_gbuffer(gpu: Gpu, size: tuple[int, int], planes: tuple[Plane, ...], layout: Layout) -> GBuffer:
+    """An empty GBuffer of (width, height). Raises GpuError."""
+    formats = {p.name: (p.components, p.encodings[layout].dtype) for p in planes}
+    return GBuffer(allocate(gpu, size, formats, gpu.depth_texture(size)), planes, layout)
+
+
+@dataclass(frozen=True, slots=True)
+class GBufferVariant:
+    """What the pass is compiled for. cutout: some opacity is below 1; color_varies: displayColor a vertex."""
+
+    planes: tuple[Plane, ...]
+    layout: Layout
+    cutout: bool
+    color_varies: bool
+
+    @property
+    def defines(self) -> list[str]:
+        flags = ["CUTOUT"] * self.cutout + ["DISPLAY_COLOR_VARIES"] * self.color_varies
+        return [plane.define for plane in self.planes] + flags
+
+
+class GBufferPass:
+    """Compiled for one variant."""
+
+    def __init__(self, gpu: Gpu, variant: GBufferVariant) -> None:
+        generated = {"generated/planes.glsl": write_source(variant.planes, variant.layout)}
+        self._context = gpu.context
+        self._program = gpu.shaders.program("gbuffer.vert", "gbuffer.frag", defines=variant.defines, generated=generated)
+
+    def draw(self, draws: DrawList, gbuffer: GBuffer) -> None:
+        """All of `draws` with the bound View, one multi-draw; both sides of every face."""
+        standard = uses_standard_depth(gbuffer.layout)
+        framebuffer = gbuffer.target.framebuffer
+        framebuffer.use()
+        framebuffer.clear(depth=1.0 if standard else 0.0)
+        self._context.enable_only(moderngl.DEPTH_TEST)
+        self._context.depth_func = "<" if standard else ">"
+        vertex_array = self._context.vertex_array(self._program, list(draws.vertices), draws.indices)
+        vertex_array.render_indirect(draws.commands)
+        vertex_array.release()

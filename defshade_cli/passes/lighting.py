@@ -1,0 +1,138 @@
+"""The lighting pass: every light is a volume, drawn instanced and blended over what the GBuffer says.
+
+Back faces are drawn, and a fragment passes where the volume's far side lies behind the surface: right with the
+camera inside the volume and with the volume crossing the near plane. Depth clamping keeps a far side that the far
+plane would cut off.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.gpu.context import DEPTH_CLAMP, Gpu
+from defshade_cli.gpu.records import record
+from defshade_cli.gpu.targets import Target
+from defshade_cli.passes.gbuffer import GBuffer
+from defshade_cli.passes.planes import Plane, read_source, uses_standard_depth
+from defshade_cli.passes.volumes import cone_volume, sphere_volume
+from defshade_cli.plan import Plan, PlannedLight, Volume
+from defshade_cli.scene.light import DistantLight, Profile, Shaping
+from defshade_cli.settings import Layout, Shading
+from defshade_cli.spaces import normalize
+
+_PROFILES: tuple[Profile, ...] = ("uniform", "cosine", "sine")
+_NO_CONE = 2.0 * math.pi
+
+
+@dataclass(frozen=True, slots=True)
+class LightingVariant:
+    """What the pass is compiled for; volumes: the kinds that some light has."""
+
+    planes: tuple[Plane, ...]
+    layout: Layout
+    shading: Shading
+    orthographic: bool
+    volumes: tuple[Volume, ...]
+
+    @classmethod
+    def of(cls, plan: Plan) -> LightingVariant:
+        orthographic = plan.camera.projection == "orthographic"
+        return cls(plan.planes, plan.layout, plan.shading, orthographic, plan.volumes)
+
+    @property
+    def defines(self) -> list[str]:
+        flags = ["CLASSIC"] * (self.shading == "classic") + ["ORTHOGRAPHIC"] * self.orthographic
+        return [plane.define for plane in self.planes] + flags
+
+
+class LightingPass:
+    """Compiled for one variant."""
+
+    def __init__(self, gpu: Gpu, variant: LightingVariant) -> None:
+        self._context = gpu.context
+        generated = {"generated/planes.glsl": read_source(variant.planes, variant.layout)}
+        emission = gpu.shaders.program("screen.vert", "emission.frag", defines=variant.defines, generated=generated)
+        self._emission = gpu.keep(gpu.context.vertex_array(emission, []))
+        self._volumes: dict[Volume, moderngl.VertexArray] = {}
+        for volume in variant.volumes:
+            defines = variant.defines + ["VOLUME_QUAD"] * (volume == "quad")
+            files = (f"light_{volume}.vert", "lighting.frag")
+            program = gpu.shaders.program(*files, defines=defines, generated=generated)
+            self._volumes[volume] = _volume_array(gpu, volume, program)
+
+    def draw(self, lights: Sequence[PlannedLight], gbuffer: GBuffer, radiance: Target) -> None:
+        """Emission and coverage, then the bound Light records on top; `radiance` is overwritten."""
+        radiance.framebuffer.use()
+        radiance.framebuffer.depth_mask = False
+        self._context.enable_only(moderngl.NOTHING)
+        self._bind(self._emission.program, gbuffer)
+        self._emission.render(vertices=3)
+        self._context.enable_direct(DEPTH_CLAMP)
+        self._context.blend_func = moderngl.ONE, moderngl.ONE
+        self._context.cull_face = "front"
+        self._context.depth_func = ">" if uses_standard_depth(gbuffer.layout) else "<"
+        kinds = [planned.volume for planned in lights]
+        for volume, array in self._volumes.items():
+            self._draw_volumes(volume, array, gbuffer, kinds.index(volume), kinds.count(volume))
+        self._context.disable_direct(DEPTH_CLAMP)
+
+    def _draw_volumes(self, volume: Volume, array: moderngl.VertexArray, gbuffer: GBuffer, first: int, count: int) -> None:
+        local = moderngl.DEPTH_TEST | moderngl.CULL_FACE
+        self._context.enable_only(moderngl.BLEND | (moderngl.NOTHING if volume == "quad" else local))
+        self._bind(array.program, gbuffer)
+        array.program["first_light"] = first
+        array.render(vertices=3 if volume == "quad" else -1, instances=count)
+
+    def _bind(self, program: moderngl.Program, gbuffer: GBuffer) -> None:
+        planes = {"depth": gbuffer.target.depth, **gbuffer.target.textures}
+        for unit, (name, texture) in enumerate(planes.items()):
+            if f"plane_{name}" in program:
+                texture.use(unit)
+                program[f"plane_{name}"] = unit
+
+
+def _volume_array(gpu: Gpu, volume: Volume, program: moderngl.Program) -> moderngl.VertexArray:
+    if volume == "quad":
+        return gpu.keep(gpu.context.vertex_array(program, []))
+    corners, triangles = sphere_volume() if volume == "sphere" else cone_volume()
+    vertices = gpu.keep(gpu.context.buffer(corners.tobytes()))
+    indices = gpu.keep(gpu.context.buffer(triangles.tobytes()))
+    return gpu.keep(gpu.context.vertex_array(program, [(vertices, "3f", "corner")], indices))
+
+
+def light_records(lights: Sequence[PlannedLight], eye: NDArray[np.float64]) -> NDArray:
+    """One Light record each, positions relative to the eye."""
+    records = np.zeros(len(lights), record("Light"))
+    for row, planned in zip(records, lights, strict=True):
+        light = planned.light
+        row["axis"] = light.axis
+        row["tangent"] = _tangent(light.axis, light.world_from_light[:3, 0])
+        row["response"] = (light.diffuse, light.specular)
+        row["profile"] = _PROFILES.index(light.profile)
+        _set_shaping(row, light.shaping)
+        if isinstance(light, DistantLight):
+            row["intensity"] = light.irradiance
+        else:
+            row["intensity"], row["reach"] = light.intensity_on_axis, planned.reach
+            row["position"] = light.position - eye
+    return records
+
+
+def _tangent(axis: NDArray[np.float64], x_axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The light's X axis where a shear has not laid it along the emission; any perpendicular would serve a volume."""
+    return normalize(x_axis - axis * np.dot(axis, x_axis))
+
+
+def _set_shaping(row: np.void, shaping: Shaping | None) -> None:
+    if shaping is None:
+        row["cone_angle"] = row["cone_smooth_start"] = _NO_CONE
+        return
+    angle, softness = math.radians(shaping.cone_angle), min(max(shaping.cone_softness, 0.0), 1.0)
+    row["cone_angle"], row["cone_smooth_start"] = angle, angle * (1.0 - softness)
+    row["focus"], row["focus_tint"] = shaping.focus, shaping.focus_tint

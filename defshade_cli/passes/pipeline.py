@@ -1,0 +1,86 @@
+"""The order of the passes. Local variables are the edges of the graph."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.residence import LIGHTS, VIEW, DrawList, GpuScene, RecordBuffer
+from defshade_cli.image.film import Film
+from defshade_cli.passes.accumulation import AccumulationPass, pixel_positions
+from defshade_cli.passes.frame import Frame
+from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
+from defshade_cli.passes.lighting import LightingPass, LightingVariant, light_records
+from defshade_cli.passes.readback import Planes, data_layers, read_planes
+from defshade_cli.passes.view import CENTRE, view_record
+from defshade_cli.plan import Plan
+from defshade_cli.scene.scene import Scene
+
+
+class Pipeline:
+    """Renders one frame after another on a Gpu, keeping what they share: buffers, targets, compiled passes."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._scene = GpuScene(gpu)
+        self._frame = Frame(gpu)
+        self._view = RecordBuffer(gpu, VIEW)
+        self._lights = RecordBuffer(gpu, LIGHTS)
+        self._gbuffer_pass = cache(lambda variant: GBufferPass(gpu, variant))
+        self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant))
+        self._accumulation = AccumulationPass(gpu)
+
+    def render(self, scene: Scene, plan: Plan) -> Film:
+        """The plan's layers. Raises GpuError."""
+        draws = self._scene.update(scene)
+        layers: dict[str, NDArray[np.float32]] = {}
+        if plan.lit:
+            self._lights.write(light_records(plan.lights, scene.camera.position))
+            layers["beauty"] = self._beauty(draws, plan)
+        if len(layers) < len(plan.layers):
+            layers |= data_layers(self._data_planes(draws, plan), plan)
+        return Film(
+            layers={name: layers[name] for name in plan.layers},
+            camera=plan.camera,
+            scene_name=scene.name,
+            frame=scene.frame,
+            frames_per_second=scene.frames_per_second,
+            samples=plan.samples,
+        )
+
+    def planes(self, scene: Scene, plan: Plan) -> Planes:
+        """The float GBuffer at the pixels' centres: what the float64 reference is evaluated on."""
+        return self._drawn_planes(self._scene.update(scene), plan)
+
+    def _beauty(self, draws: DrawList, plan: Plan) -> NDArray[np.float32]:
+        gbuffer = self._frame.gbuffer(plan.size, plan.planes, plan.layout)
+        sample = self._frame.radiance("sample", plan.size, gbuffer)
+        total = self._frame.radiance("total", plan.size) if plan.samples > 1 else sample
+        lighting = self._lighting_pass(LightingVariant.of(plan))
+        total.framebuffer.clear()
+        for index, position in enumerate(pixel_positions(plan.samples)):
+            self._draw_gbuffer(draws, plan, gbuffer, position, index)
+            lighting.draw(plan.lights, gbuffer, sample)
+            if plan.samples > 1:
+                self._accumulation.add(sample, total)
+        return total.read("radiance") / np.float32(plan.samples)
+
+    def _data_planes(self, draws: DrawList, plan: Plan) -> Planes:
+        """Planes for the data layers: the beauty's own where it drew them in float at the pixels' centres."""
+        if plan.lit and not plan.data_pass:
+            return read_planes(self._frame.gbuffer(plan.size, plan.planes, plan.layout), plan)
+        return self._drawn_planes(draws, plan)
+
+    def _drawn_planes(self, draws: DrawList, plan: Plan) -> Planes:
+        gbuffer = self._frame.gbuffer(plan.size, plan.planes, "float")
+        self._draw_gbuffer(draws, plan, gbuffer, CENTRE)
+        return read_planes(gbuffer, plan)
+
+    def _draw_gbuffer(
+        self, draws: DrawList, plan: Plan, gbuffer: GBuffer, position: tuple[float, float], sample: int = 0
+    ) -> None:
+        self._view.write(view_record(plan, gbuffer.layout, position, sample))
+        variant = GBufferVariant(gbuffer.planes, gbuffer.layout, plan.cutout, draws.color_varies)
+        self._gbuffer_pass(variant).draw(draws, gbuffer)

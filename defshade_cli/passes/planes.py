@@ -1,0 +1,152 @@
+"""The GBuffer's planes: one table of name, format, encoding and need; GLSL on both sides is generated from it.
+
+`rgba8` is the seed's layout bit for bit, `packed` spends the same bytes better, `float` keeps everything.
+The planes behind the first two exist only when a material or a requested layer needs them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from defshade_cli.scene.material import Material
+from defshade_cli.settings import Layout
+
+
+@dataclass(frozen=True, slots=True)
+class Encoding:
+    """One plane in one layout.
+
+    dtype: moderngl's, f1 for 8-bit unorm, f2 half, f4 float.
+    write: GLSL value from `Surface s`; read: GLSL statements that set members of `s` from `vec4 t`.
+    """
+
+    dtype: str
+    write: str
+    read: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plane:
+    """One render target. needed: does this material make it necessary?"""
+
+    name: str
+    components: int
+    encodings: dict[Layout, Encoding]
+    needed: Callable[[Material], bool]
+
+    @property
+    def define(self) -> str:
+        return f"PLANE_{self.name.upper()}"
+
+
+def _encodings(write: str, read: str, narrow: str = "f1", wide: str = "f4") -> dict[Layout, Encoding]:
+    """The same expression in all three layouts."""
+    return {
+        "rgba8": Encoding(narrow, write, read),
+        "packed": Encoding(narrow, write, read),
+        "float": Encoding(wide, write, read),
+    }
+
+
+def _always(_: Material) -> bool:
+    return True
+
+
+_BASE_READ = "s.metallic = t.a;"
+_ROUGHNESS_READ = "s.roughness = t.a;"
+
+PLANES: tuple[Plane, ...] = (
+    Plane(
+        "base",
+        4,
+        {
+            "rgba8": Encoding("f1", "vec4(s.base, s.metallic)", f"s.base = t.rgb; {_BASE_READ}"),
+            "packed": Encoding(
+                "f1", "vec4(srgb_from_linear(s.base), s.metallic)", f"s.base = linear_from_srgb(t.rgb); {_BASE_READ}"
+            ),
+            "float": Encoding("f4", "vec4(s.base, s.metallic)", f"s.base = t.rgb; {_BASE_READ}"),
+        },
+        _always,
+    ),
+    Plane(
+        "normal",
+        4,
+        {
+            "rgba8": Encoding(
+                "f1",
+                "vec4(s.normal * 0.5 + 0.5, s.roughness)",
+                f"s.normal = normalize(t.xyz * 2.0 - 1.0); {_ROUGHNESS_READ}",
+            ),
+            "packed": Encoding(
+                "f1",
+                "vec4(bytes_from_unit(s.normal), s.roughness)",
+                f"s.normal = unit_from_bytes(t.xyz); {_ROUGHNESS_READ}",
+            ),
+            "float": Encoding("f4", "vec4(s.normal, s.roughness)", f"s.normal = t.xyz; {_ROUGHNESS_READ}"),
+        },
+        _always,
+    ),
+    Plane(
+        "emission",
+        4,
+        _encodings("vec4(s.emission, 0.0)", "s.emission = t.rgb;", narrow="f2"),
+        lambda material: any(material.emissive_color),
+    ),
+    Plane(
+        "specular",
+        4,
+        _encodings(
+            "vec4(s.f0, 0.0)",
+            "s.f0 = t.rgb;",  # F90 needs no plane: the specular workflow has metallic 0, for which it is white
+            narrow="f2",
+        ),
+        lambda material: material.use_specular_workflow or material.ior != 1.5,
+    ),
+    Plane(
+        "clearcoat",
+        2,
+        _encodings("vec4(s.clearcoat, s.clearcoat_roughness, 0.0, 0.0)", "s.clearcoat = t.x; s.clearcoat_roughness = t.y;"),
+        lambda material: material.clearcoat > 0.0,
+    ),
+)
+
+
+def needed_planes(materials: Iterable[Material], layers: Iterable[str] = ()) -> tuple[Plane, ...]:
+    """The planes that some material needs, or that a layer of the same name asks for, in the table's order."""
+    materials, names = list(materials), set(layers)
+    return tuple(p for p in PLANES if p.name in names or any(p.needed(m) for m in materials))
+
+
+def write_source(planes: Sequence[Plane], layout: Layout) -> str:
+    """GLSL: the outputs, and `void write_planes(Surface s)`."""
+    outputs = [f"layout(location = {i}) out vec4 plane_{p.name};" for i, p in enumerate(planes)]
+    body = [f"    plane_{p.name} = {p.encodings[layout].write};" for p in planes]
+    return "\n".join(['#include "lib/encode.glsl"', *outputs, "", "void write_planes(Surface s) {", *body, "}"])
+
+
+def read_source(planes: Sequence[Plane], layout: Layout) -> str:
+    """GLSL: the samplers, `BACKGROUND_DEPTH`, and `Surface read_planes(ivec2 pixel)`."""
+    samplers = [f"uniform sampler2D plane_{name};" for name in ("depth", *(p.name for p in planes))]
+    body = [f"    t = texelFetch(plane_{p.name}, pixel, 0); {p.encodings[layout].read}" for p in planes]
+    base = next(i for i, p in enumerate(planes) if p.name == "base")
+    body.insert(base + 1, "    set_metallic_fresnel(s, DEFAULT_F0);")
+    return "\n".join(
+        [
+            '#include "lib/encode.glsl"',
+            *samplers,
+            f"const float BACKGROUND_DEPTH = {1.0 if uses_standard_depth(layout) else 0.0};",
+            "",
+            "Surface read_planes(ivec2 pixel) {",
+            "    Surface s;",
+            "    vec4 t;",
+            *body,
+            "    return s;",
+            "}",
+        ]
+    )
+
+
+def uses_standard_depth(layout: Layout) -> bool:
+    """The seed compares depth with LESS, 0 at the near plane; the other layouts reverse it."""
+    return layout == "rgba8"

@@ -1,0 +1,64 @@
+"""GBuffer planes and radiance as named layers in NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.image.layers import LAYERS
+from defshade_cli.passes.gbuffer import GBuffer
+from defshade_cli.passes.planes import uses_standard_depth
+from defshade_cli.passes.view import camera_depth
+from defshade_cli.plan import Plan
+from defshade_cli.scene.camera import Camera
+from defshade_cli.spaces import transform_points
+
+Planes = dict[str, NDArray[np.float32]]
+
+
+def read_planes(gbuffer: GBuffer, plan: Plan) -> Planes:
+    """(height, width, components) float32 a plane of a float GBuffer, and "depth": planar, +inf on the background."""
+    planes: Planes = {plane.name: gbuffer.target.read(plane.name) for plane in gbuffer.planes}
+    stored = gbuffer.target.read_depth()
+    depth = camera_depth(plan.camera, plan.clip, uses_standard_depth(gbuffer.layout), stored)
+    planes["depth"] = depth.astype(np.float32)[..., None]
+    return planes
+
+
+def data_layers(planes: Planes, plan: Plan) -> dict[str, NDArray[np.float32]]:
+    """The data layers that the plan asks for, background filled in."""
+    covered = np.isfinite(planes["depth"])
+    layers = {}
+    for name in plan.layers:
+        layer = LAYERS[name]
+        if layer.source != "lighting":
+            values = _layer_values(name, planes, plan.camera)
+            layers[name] = np.where(covered, values, np.float32(layer.background)).astype(np.float32)
+    return layers
+
+
+def _layer_values(name: str, planes: Planes, camera: Camera) -> NDArray:
+    match name:
+        case "depth":
+            return planes["depth"]
+        case "distance":
+            return np.linalg.norm(_camera_positions(planes["depth"], camera), axis=-1, keepdims=True)
+        case "position":
+            return transform_points(camera.world_from_camera, _camera_positions(planes["depth"], camera))
+        case "metallic":
+            return planes["base"][..., 3:]
+        case "roughness":
+            return planes["normal"][..., 3:]
+        case _:
+            return planes[LAYERS[name].source][..., :3]
+
+
+def _camera_positions(depth: NDArray[np.float32], camera: Camera) -> NDArray[np.float64]:
+    """(height, width, 3) camera-space points at the pixels' centres; 0 on the background."""
+    height, width = depth.shape[:2]
+    left, right, bottom, top = camera.window
+    x = left + (right - left) * (np.arange(width) + 0.5) / width
+    y = top + (bottom - top) * (np.arange(height) + 0.5) / height
+    z = np.where(np.isfinite(depth), depth, 0.0).astype(np.float64)[..., 0]
+    scale = z if camera.projection == "perspective" else np.ones_like(z)
+    return np.stack([x[None, :] * scale, y[:, None] * scale, -z], axis=-1)

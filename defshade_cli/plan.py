@@ -1,0 +1,215 @@
+"""What one frame needs, and what it skips and why: decided once, before anything is drawn.
+
+Reach of a light. Outside its volume a light may add no more than its share of `light_tolerance` to a pixel, so that
+all that is dropped stays below it. With the far field I/d² and a bound K on BRDF · NoL of the scene's materials,
+
+    reach² = exposure · I_max · K · lights / light_tolerance,    K = 1/π + 1/(2π α³)
+
+(GGX: D ≤ 1/(πα²); height-correlated Smith: V·NoL ≤ 1/(2α); F ≤ 1; α the least of the scene). No light reaches
+further than the geometry does.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.errors import UsageError
+from defshade_cli.image.layers import LAYERS
+from defshade_cli.passes.planes import PLANES, Plane, needed_planes
+from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.light import DistantLight, Light
+from defshade_cli.scene.scene import Scene
+from defshade_cli.settings import Layout, RenderSettings, Shading
+from defshade_cli.spaces import transform_points
+from defshade_cli.units import exposure_scale
+
+Volume = Literal["quad", "sphere", "cone"]
+
+DEFAULT_SIZE = (1920, 1080)
+_MARGIN = 1e-3  # relative slack around bounds that float32 may round outwards
+_MIN_ALPHA = 1e-4  # shaders/lib/constants.glsl
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """One thing the plan chose, and the fact it follows from."""
+
+    subject: str
+    choice: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlannedLight:
+    """reach: radius of the volume in scene units, infinite for a quad."""
+
+    light: Light
+    volume: Volume
+    reach: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """All that the passes read beside the Scene.
+
+    camera: conformed to the image.  clip: (near, far), the camera's range tightened to the geometry.
+    exposure: linear, the camera's and the settings' together.
+    planes: of the GBuffer; lights: sorted quads, spheres, cones.
+    cutout: some opacity is below 1.  data_pass: data layers need an unjittered float GBuffer of their own.
+    """
+
+    size: tuple[int, int]
+    camera: Camera
+    clip: tuple[float, float]
+    exposure: float
+    layout: Layout
+    shading: Shading
+    samples: int
+    layers: tuple[str, ...]
+    planes: tuple[Plane, ...]
+    lights: tuple[PlannedLight, ...]
+    cutout: bool
+    data_pass: bool
+    decisions: tuple[Decision, ...]
+
+    @property
+    def lit(self) -> bool:
+        """Does any layer need the lighting?"""
+        return any(LAYERS[name].source == "lighting" for name in self.layers)
+
+    @property
+    def volumes(self) -> tuple[Volume, ...]:
+        """The kinds of volume that some light has, in the order of the lights."""
+        return tuple(dict.fromkeys(planned.volume for planned in self.lights))
+
+    @property
+    def passes(self) -> tuple[str, ...]:
+        lighting = ("gbuffer", "emission", *(f"light {volume}" for volume in self.volumes), "accumulation")
+        return (lighting if self.lit else ()) + (("data gbuffer",) if self.data_pass or not self.lit else ())
+
+
+def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
+    """Decide. Raises UsageError for a layer that does not exist or an image without pixels."""
+    _check_layers(settings.layers)
+    size = image_size(scene, settings)
+    camera = scene.camera.conformed(size[0] * scene.pixel_aspect / size[1], scene.conform)
+    exposure = camera.exposure * exposure_scale(settings.exposure)
+    lights = _plan_lights(scene, exposure, settings)
+    planes = needed_planes(scene.materials, settings.layers)
+    cutout = _has_cutout(scene)
+    data_layers = [name for name in settings.layers if LAYERS[name].source != "lighting"]
+    data_pass = bool(data_layers) and (settings.layout != "float" or settings.samples > 1 or cutout)
+    return Plan(
+        size=size,
+        camera=camera,
+        clip=_tight_clip(camera, scene.bounds),
+        exposure=exposure,
+        layout=settings.layout,
+        shading=settings.shading,
+        samples=settings.samples,
+        layers=settings.layers,
+        planes=planes,
+        lights=lights,
+        cutout=cutout,
+        data_pass=data_pass,
+        decisions=_explain(settings, planes, lights, cutout, data_layers, data_pass),
+    )
+
+
+def image_size(scene: Scene, settings: RenderSettings) -> tuple[int, int]:
+    """(width, height): the settings', else the stage's, else 1920x1080. Raises UsageError for an empty image."""
+    size = settings.size or scene.resolution or DEFAULT_SIZE
+    if settings.width is not None:
+        size = (settings.width, max(1, round(settings.width / scene.camera.aspect)))
+    if min(size) < 1:
+        raise UsageError(f"an image of {size[0]}x{size[1]} has no pixels")
+    return size
+
+
+def _check_layers(names: tuple[str, ...]) -> None:
+    unknown = [name for name in names if name not in LAYERS]
+    if unknown or not names:
+        raise UsageError(f"no layer named {', '.join(unknown) or '(none given)'}; there are {', '.join(LAYERS)}")
+
+
+def _has_cutout(scene: Scene) -> bool:
+    if any(m.opacity < 1.0 or m.opacity_threshold > 0.0 for m in scene.materials):
+        return True
+    varying = [m.display_opacity for m in scene.meshes if m.display_opacity is not None]
+    constant = [d.display_opacity for d in scene.drawables]
+    return any(m.uses_display_color for m in scene.materials) and any((o < 1.0).any() for o in varying + constant)
+
+
+def _tight_clip(camera: Camera, bounds: NDArray[np.float64]) -> tuple[float, float]:
+    """The camera's clipping range without the empty space before and behind the geometry."""
+    near, far = camera.clipping_range
+    if not np.isfinite(bounds).all():
+        return near, far
+    depth = -transform_points(camera.camera_from_world, np.array(list(product(*bounds.T))))[:, 2]
+    slack = _MARGIN * float(np.abs(depth).max())
+    tight = max(near, float(depth.min()) - slack), min(far, float(depth.max()) + slack)
+    return tight if tight[0] < tight[1] else (near, far)
+
+
+def volume_of(light: Light) -> Volume:
+    """Distant light → quad; a cone of at most 90° → cone; every other light → sphere."""
+    if isinstance(light, DistantLight):
+        return "quad"
+    return "cone" if light.shaping and light.shaping.cone_angle <= 90.0 else "sphere"
+
+
+def _plan_lights(scene: Scene, exposure: float, settings: RenderSettings) -> tuple[PlannedLight, ...]:
+    lit = [light for light in scene.lights if _peak(light) > 0.0]
+    alpha = min((max(m.roughness**2, _MIN_ALPHA) for m in scene.materials), default=1.0)
+    response = 1.0 / math.pi + 1.0 / (2.0 * math.pi * alpha**3)
+    share = settings.light_tolerance / max(len(lit), 1)
+    order: dict[str, int] = {"quad": 0, "sphere": 1, "cone": 2}
+    planned = [
+        PlannedLight(light, volume_of(light), _reach(light, scene.bounds, exposure * response / share)) for light in lit
+    ]
+    return tuple(sorted(planned, key=lambda p: order[p.volume]))
+
+
+def _peak(light: Light) -> float:
+    strength = light.irradiance if isinstance(light, DistantLight) else light.intensity_on_axis
+    return float(np.max(strength)) * max(light.diffuse, light.specular)
+
+
+def _reach(light: Light, bounds: NDArray[np.float64], gain: float) -> float:
+    if isinstance(light, DistantLight):
+        return math.inf
+    farthest = np.max(np.abs(bounds - light.position), axis=0)
+    geometry = float(np.linalg.norm(farthest)) * (1.0 + _MARGIN)
+    return min(math.sqrt(_peak(light) * gain), geometry)
+
+
+def _explain(
+    settings: RenderSettings,
+    planes: tuple[Plane, ...],
+    lights: tuple[PlannedLight, ...],
+    cutout: bool,
+    data_layers: list[str],
+    data_pass: bool,
+) -> tuple[Decision, ...]:
+    decisions = [Decision("layout", settings.layout, "as asked")]
+    for plane in PLANES:
+        kept = plane in planes
+        reason = "a material or layer needs it" if kept else "no material and no layer needs it"
+        decisions.append(Decision(f"plane {plane.name}", "kept" if kept else "skipped", reason))
+    for volume in ("quad", "sphere", "cone"):
+        count = sum(p.volume == volume for p in lights)
+        choice = f"{count} drawn" if count else "skipped"
+        decisions.append(Decision(f"{volume} volumes", choice, "lights that reach geometry" if count else "no such light"))
+    decisions.append(Decision("cutout", "kept" if cutout else "skipped", f"{'some' if cutout else 'no'} opacity is below 1"))
+    if data_layers:
+        reason = "the beauty's GBuffer is jittered, quantised or dithered" if data_pass else "one float sample serves both"
+        decisions.append(Decision("data GBuffer", "kept" if data_pass else "shared", reason))
+    if "beauty" not in settings.layers:
+        decisions.append(Decision("lighting", "skipped", "no layer needs it"))
+    return tuple(decisions)

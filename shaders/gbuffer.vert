@@ -1,0 +1,31 @@
+#include "lib/view.glsl"
+
+layout(std430, binding = 1) readonly buffer InstanceBlock { Instance instances[]; };
+
+in vec3 position_object;
+in vec3 normal_object;
+#ifdef DISPLAY_COLOR_VARIES
+in vec4 vertex_color;          // alpha is opacity; negative: the instance's value counts
+#endif
+in uvec2 draw;                 // instance, material
+
+out vec3 normal_relative;
+out vec4 display_color;
+flat out uint material_index;
+flat out uint instance_index;
+flat out float handedness;
+
+void main() {
+    Instance instance = instances[draw.x];
+    vec4 position = instance.relative_from_object * vec4(position_object, 1.0);
+    normal_relative = mat3(instance.relative_from_normal) * normal_object;
+    display_color = vec4(instance.display_color, instance.display_opacity);
+#ifdef DISPLAY_COLOR_VARIES
+    if (vertex_color.r >= 0.0) display_color.rgb = vertex_color.rgb;
+    if (vertex_color.a >= 0.0) display_color.a = vertex_color.a;
+#endif
+    instance_index = draw.x;
+    material_index = draw.y;
+    handedness = instance.handedness;
+    gl_Position = view.clip_from_relative * vec4(position.xyz, 1.0);
+}

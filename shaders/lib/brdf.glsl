@@ -1,0 +1,36 @@
+#include "lib/constants.glsl"
+
+float GGX_alpha(float roughness) {
+    return max(roughness * roughness, MIN_ALPHA);
+}
+
+// Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces".
+// 1 - NoH^2 = |n x h|^2 (Lagrange's identity) keeps narrow lobes exact in float32.
+float D_GGX(float alpha, float NoH, vec3 n, vec3 h) {
+    vec3 nxh = cross(n, h);
+    float a = NoH * alpha;
+    float k = alpha / (dot(nxh, nxh) + a * a);
+    return k * k * (1.0 / PI);
+}
+
+// Heitz 2014, "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", G2 / (4 NoL NoV).
+float V_SmithGGXCorrelated(float NoV, float NoL, float alpha) {
+    float a2 = alpha * alpha;
+    float lambda_v = NoL * sqrt(NoV * NoV * (1.0 - a2) + a2);
+    float lambda_l = NoV * sqrt(NoL * NoL * (1.0 - a2) + a2);
+    return 0.5 / (lambda_v + lambda_l);
+}
+
+// Schlick 1994, "An Inexpensive BRDF Model for Physically-based Rendering": G1 with k = alpha / 2
+// on both sides, divided by 4 NoL NoV.
+float V_SmithSchlick(float NoV, float NoL, float alpha) {
+    float k = 0.5 * alpha;
+    return 0.25 / ((NoV * (1.0 - k) + k) * (NoL * (1.0 - k) + k));
+}
+
+// Schlick 1994.
+vec3 F_Schlick(vec3 f0, vec3 f90, float VoH) {
+    float x = clamp(1.0 - VoH, 0.0, 1.0);
+    float x2 = x * x;
+    return f0 + (f90 - f0) * (x2 * x2 * x);
+}

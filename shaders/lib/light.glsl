@@ -1,0 +1,41 @@
+#include "lib/records.glsl"
+#include "lib/constants.glsl"
+
+layout(std430, binding = 3) readonly buffer LightBlock { Light lights[]; };
+
+const uint PROFILE_UNIFORM = 0u;
+const uint PROFILE_COSINE = 1u;
+const uint PROFILE_SINE = 2u;
+
+// UsdLuxShapingAPI: cone with softness, focus with tint; `cosine` is between the axis and the direction of emission.
+vec3 shaping(Light light, float cosine, float sine) {
+    float angle = atan(sine, cosine);
+    float cone = angle <= light.cone_smooth_start ? 1.0 :
+                 angle >= light.cone_angle ? 0.0 :
+                 1.0 - smoothstep(light.cone_smooth_start, light.cone_angle, angle);
+    float focus = light.focus > 0.0 ? pow(abs(cosine), light.focus) : 1.0;
+    return cone * mix(light.focus_tint, vec3(1.0), focus);
+}
+
+// Far field of the light's shape over its value on axis.
+float profile(Light light, vec3 emission_direction, float cosine) {
+    if (light.profile == PROFILE_COSINE) return max(cosine, 0.0);
+    if (light.profile == PROFILE_SINE) return length(cross(light.tangent, emission_direction));
+    return 1.0;
+}
+
+// Light from `light` at a relative position: the unit vector towards it, and the irradiance on a surface facing it.
+vec3 irradiance_from(Light light, vec3 position, out vec3 l) {
+#ifdef VOLUME_QUAD
+    l = -light.axis;
+    return light.intensity;
+#else
+    vec3 to_light = light.position - position;
+    float distance_squared = dot(to_light, to_light);
+    l = to_light * inversesqrt(distance_squared);
+    if (distance_squared >= light.reach * light.reach) return vec3(0.0);
+    float cosine = dot(-l, light.axis);
+    float sine = length(cross(l, light.axis));
+    return light.intensity * shaping(light, cosine, sine) * (profile(light, -l, cosine) / distance_squared);
+#endif
+}

@@ -1,0 +1,48 @@
+// What the CPU uploads, std430. The NumPy dtypes are derived from these structs.
+
+struct View {
+    mat4 clip_from_relative;
+    mat4 relative_from_camera;
+    vec4 window;               // left, right, bottom, top on the plane one unit ahead
+    vec2 depth_coefficients;   // camera depth z: 1 / z (perspective) or z (orthographic) = x * stored + y
+    vec2 size;                 // pixels
+    float exposure;
+    uint sample_index;
+};
+
+struct Instance {
+    mat4 relative_from_object;
+    mat4 relative_from_normal; // inverse transpose of the linear part
+    vec3 display_color;
+    float display_opacity;
+    float handedness;          // -1 where the placement mirrors
+};
+
+struct Material {
+    vec3 diffuse_color;
+    float metallic;
+    vec3 emissive_color;
+    float roughness;
+    vec3 specular_color;
+    float ior;
+    float clearcoat;
+    float clearcoat_roughness;
+    float opacity;
+    float opacity_threshold;
+    uint use_specular_workflow;
+    uint uses_display_color;
+};
+
+struct Light {
+    vec3 position;
+    float reach;
+    vec3 axis;                 // unit, the direction of emission
+    float cone_angle;          // radians off the axis; pi for no cone
+    vec3 tangent;              // unit, the light's X axis
+    float cone_smooth_start;   // radians: where the fall to the cone's edge begins
+    vec3 intensity;            // candela-like on axis; irradiance of a distant light
+    float focus;
+    vec3 focus_tint;
+    uint profile;
+    vec2 response;             // multipliers of the diffuse and of the specular lobe
+};

@@ -1,0 +1,74 @@
+#include "lib/brdf.glsl"
+
+// What the GBuffer says of one pixel.
+struct Surface {
+    vec3 normal;               // unit, facing the camera
+    vec3 base;
+    float metallic;
+    float roughness;
+    vec3 emission;
+    vec3 f0;
+    vec3 f90;
+    float clearcoat;
+    float clearcoat_roughness;
+};
+
+// Reflectance at normal incidence of a dielectric in air.
+float F0_from_ior(float ior) {
+    float r = (1.0 - ior) / (1.0 + ior);
+    return r * r;
+}
+
+const float DEFAULT_F0 = 0.04; // ior 1.5, UsdPreviewSurface's default
+
+// UsdPreviewSurface, metallic workflow: F0 and F90 go from the dielectric's to the base colour's.
+void set_metallic_fresnel(inout Surface s, float dielectric_f0) {
+    s.f90 = mix(vec3(1.0), s.base, s.metallic);
+    s.f0 = mix(dielectric_f0 * s.f90, s.f90, s.metallic);
+}
+
+struct Angles {
+    float NoV, NoL, NoH, VoH;
+};
+
+Angles angles_between(vec3 n, vec3 v, vec3 l, vec3 h) {
+    return Angles(max(dot(n, v), MIN_NOV), dot(n, l), dot(n, h), dot(v, h));
+}
+
+// UsdPreviewSurface as its schema describes it. `response` scales the diffuse and the specular lobe.
+vec3 brdf_preview_surface(Surface s, Angles a, vec3 h, vec2 response) {
+    float alpha = GGX_alpha(s.roughness);
+    vec3 F = F_Schlick(s.f0, s.f90, a.VoH);
+    vec3 diffuse = s.base * ((1.0 - s.metallic) / PI) * (1.0 - F);
+    vec3 specular = D_GGX(alpha, a.NoH, s.normal, h) * V_SmithGGXCorrelated(a.NoV, a.NoL, alpha) * F;
+    vec3 result = diffuse * response.x + specular * response.y;
+#ifdef PLANE_CLEARCOAT
+    float coat_alpha = GGX_alpha(s.clearcoat_roughness);
+    float coat_F = s.clearcoat * F_Schlick(vec3(DEFAULT_F0), vec3(1.0), a.VoH).x;
+    float coat = D_GGX(coat_alpha, a.NoH, s.normal, h) * V_SmithGGXCorrelated(a.NoV, a.NoL, coat_alpha) * coat_F;
+    result = result * (1.0 - coat_F) + coat * response.y;
+#endif
+    return result;
+}
+
+// The seed's lighting equation with its three defects mended: docs/lighting.md.
+vec3 brdf_classic(Surface s, Angles a, vec3 h, vec2 response) {
+    float alpha = GGX_alpha(s.roughness);
+    vec3 real_albedo = s.base - s.base * s.metallic;
+    vec3 real_specular = mix(vec3(0.03), s.base, s.metallic);
+    vec3 F = F_Schlick(real_specular, vec3(1.0), a.VoH);
+    vec3 specular = D_GGX(alpha, a.NoH, s.normal, h) * V_SmithSchlick(a.NoV, a.NoL, alpha) * F;
+    return real_albedo / PI * max(1.0 - specular, 0.0) * response.x + specular * response.y;
+}
+
+// The BRDF times NoL, for unit vectors towards the eye and the light.
+vec3 evaluate_brdf(Surface s, vec3 v, vec3 l, vec2 response) {
+    vec3 h = normalize(v + l);
+    Angles a = angles_between(s.normal, v, l, h);
+    if (a.NoL <= 0.0) return vec3(0.0);
+#ifdef CLASSIC
+    return brdf_classic(s, a, h, response) * a.NoL;
+#else
+    return brdf_preview_surface(s, a, h, response) * a.NoL;
+#endif
+}

@@ -1,0 +1,20 @@
+#include "lib/view.glsl"
+#include "lib/surface.glsl"
+#include "lib/light.glsl"
+#include "generated/planes.glsl"
+
+flat in uint light_index;
+out vec4 radiance;
+
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    float stored = texelFetch(plane_depth, pixel, 0).x;
+    if (stored == BACKGROUND_DEPTH) discard;
+    vec3 position = position_at(gl_FragCoord.xy, camera_depth(stored));
+    vec3 l;
+    vec3 irradiance = irradiance_from(lights[light_index], position, l);
+    if (irradiance == vec3(0.0)) discard;
+    Surface surface = read_planes(pixel);
+    vec3 f = evaluate_brdf(surface, direction_to_eye(position), l, lights[light_index].response);
+    radiance = vec4(view.exposure * irradiance * f, 0.0);
+}
