@@ -205,10 +205,16 @@ def _explain(
     for volume in ("quad", "sphere", "cone"):
         count = sum(p.volume == volume for p in lights)
         choice = f"{count} drawn" if count else "skipped"
-        decisions.append(Decision(f"{volume} volumes", choice, "lights that reach geometry" if count else "no such light"))
-    decisions.append(Decision("cutout", "kept" if cutout else "skipped", f"{'some' if cutout else 'no'} opacity is below 1"))
+        decisions.append(
+            Decision(f"{volume} volumes", choice, "lights that reach geometry" if count else "no such light")
+        )
+    decisions.append(
+        Decision("cutout", "kept" if cutout else "skipped", f"{'some' if cutout else 'no'} opacity is below 1")
+    )
     if data_layers:
-        reason = "the beauty's GBuffer is jittered, quantised or dithered" if data_pass else "one float sample serves both"
+        reason = (
+            "the beauty's GBuffer is jittered, quantised or dithered" if data_pass else "one float sample serves both"
+        )
         decisions.append(Decision("data GBuffer", "kept" if data_pass else "shared", reason))
     if "beauty" not in settings.layers:
         decisions.append(Decision("lighting", "skipped", "no layer needs it"))

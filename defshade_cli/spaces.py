@@ -47,7 +47,7 @@ def normalize(vectors: NDArray) -> NDArray:
 
 
 def rigid(matrix: Matrix) -> Matrix:
-    """The nearest rotation (polar decomposition, by SVD) with the matrix's translation: a camera ignores scale and shear."""
+    """The nearest rotation (polar decomposition, by SVD), same translation: a camera ignores scale and shear."""
     u, _, vt = np.linalg.svd(matrix[:3, :3])
     rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
     result = np.eye(4)

@@ -9,7 +9,7 @@ flat out uint light_index;
 uniform uint first_light;
 
 // 32 sides of a regular polygon around the circle: tan of the angle grows by 1 / cos(pi / 32).
-const float CIRCUMSCRIBED = 1.0048385;
+const float CIRCUMSCRIBED = 1.0048386;
 
 vec3 cone_corner(Light light) {
     float angle = atan(CIRCUMSCRIBED * sin(light.cone_angle), cos(light.cone_angle)) * length(corner.xy);

@@ -51,7 +51,9 @@ class Gpu:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._stack.close()
 
     @property
@@ -80,7 +82,9 @@ class Gpu:
         """
         texture = self.context.depth_texture(size)
         bind = self._entry_point("glBindTexture", ctypes.c_uint, ctypes.c_uint)
-        specify = self._entry_point("glTexImage2D", *[ctypes.c_uint] * 2, *[ctypes.c_int] * 4, *[ctypes.c_uint] * 2, ctypes.c_void_p)
+        specify = self._entry_point(
+            "glTexImage2D", *[ctypes.c_uint] * 2, *[ctypes.c_int] * 4, *[ctypes.c_uint] * 2, ctypes.c_void_p
+        )
         bind(_TEXTURE_2D, texture.glo)
         specify(_TEXTURE_2D, 0, _DEPTH_COMPONENT32F, *size, 0, _DEPTH_COMPONENT, _FLOAT, None)
         texture.compare_func = ""
@@ -122,9 +126,11 @@ def describe_devices(limit: int = 16) -> list[Device]:
 
 
 def _create_context(device: int | None) -> moderngl.Context:
-    options: dict[str, Any] = {} if device is None else {"device_index": device}
+    options: dict[str, Any] = {"backend": "egl", "libgl": LIBGL, "libegl": LIBEGL}
+    if device is not None:
+        options["device_index"] = device
     try:
-        return moderngl.create_context(standalone=True, backend="egl", libgl=LIBGL, libegl=LIBEGL, **options)
+        return moderngl.create_context(standalone=True, **options)
     except Exception as error:  # glcontext raises bare Exception, ValueError or ImportError by case
         reason = str(error).rstrip(".")
         raise GpuError(f"no OpenGL context through EGL ({reason}); on Debian or Ubuntu: {INSTALL_HINT}") from error

@@ -13,7 +13,7 @@ import numpy as np
 from defshade_cli.resources import SHADERS
 
 _STRUCT = re.compile(r"struct\s+(\w+)\s*\{(.*?)\}\s*;", re.DOTALL)
-_FIELD = re.compile(r"^\s*(\w+)\s+(\w+)\s*;", re.MULTILINE)
+_FIELD = re.compile(r"(\w+)\s+(\w+)\s*;")
 _COMMENT = re.compile(r"//[^\n]*")
 
 _TYPES: dict[str, tuple[np.dtype, int]] = {

@@ -100,8 +100,10 @@ def instance_records(drawables: Sequence[Drawable], eye: NDArray[np.float64]) ->
 
 
 def _normal_matrices(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Cofactors scaled to unit size, with the determinant's sign: the inverse transpose that no singular matrix breaks."""
-    columns = linear.transpose(0, 2, 1) / np.maximum(np.abs(linear).max(axis=(1, 2)), np.finfo(float).tiny)[:, None, None]
+    """Cofactors of unit size with the determinant's sign: an inverse transpose that no singular matrix breaks."""
+    columns = (
+        linear.transpose(0, 2, 1) / np.maximum(np.abs(linear).max(axis=(1, 2)), np.finfo(float).tiny)[:, None, None]
+    )
     x, y, z = columns[:, 0], columns[:, 1], columns[:, 2]
     cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=-1)
     handedness = np.where(np.einsum("ni,ni->n", x, cofactors[..., 0]) < 0, -1.0, 1.0)

@@ -1,7 +1,8 @@
 """GLSL files to programs.
 
 `#include "path"` is resolved once a program, relative to the shaders' folder; sources that Python generates are
-included by name in the same way. Every line keeps its origin, so a compile error reads as file:line.
+included by name in the same way. Every assembled line keeps its origin, so a compile error reads as file:line
+(drivers lose the source number of `#line`, so none is written).
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import moderngl
 
@@ -16,23 +18,30 @@ from defshade_cli.errors import ShaderError
 from defshade_cli.resources import SHADERS
 
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
-_LOCATION = re.compile(r"\b(\d+)(?::(\d+)(?:\(\d+\))?|\((\d+)\))\s*:")  # Mesa "0:12(3):", NVIDIA "0(12) :"
-_STAGES = {"vert": "vertex_shader", "frag": "fragment_shader", "geom": "geometry_shader"}
+_LOCATION = re.compile(r"\b\d+(?::(\d+)(?:\(\d+\))?|\((\d+)\))\s*:")  # Mesa "0:12(3):", NVIDIA "0(12) :"
+_STAGES = {"vert": "vertex_shader", "frag": "fragment_shader"}
+
+Generated = Mapping[str, str] | None
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """One shader after its includes: the text, and the file that each `#line` number of a source stands for."""
+    """One shader after its includes: the text, and (file, line) of each of its lines."""
 
     text: str
-    files: tuple[str, ...]
+    origins: tuple[tuple[str, int], ...]
+
+    @property
+    def name(self) -> str:
+        """The file that holds `main`."""
+        return self.origins[-1][0]
 
     def locate(self, message: str) -> str:
-        """The driver's message with its source numbers replaced by file names."""
+        """The driver's message with its line numbers replaced by file:line."""
 
         def named(match: re.Match[str]) -> str:
-            index, line = int(match[1]), match[2] or match[3]
-            return f"{self.files[index]}:{line}:" if index < len(self.files) else match[0]
+            line = int(match[1] or match[2])
+            return "{}:{}:".format(*self.origins[line - 1]) if line <= len(self.origins) else match[0]
 
         return _LOCATION.sub(named, message)
 
@@ -40,37 +49,40 @@ class Source:
 @dataclass(slots=True)
 class _Assembly:
     generated: Mapping[str, str]
-    files: list[str] = field(default_factory=list)
+    included: set[str] = field(default_factory=set)
     lines: list[str] = field(default_factory=list)
+    origins: list[tuple[str, int]] = field(default_factory=list)
 
-    def include(self, name: str) -> None:
-        if name in self.files:
+    def add(self, line: str, file: str, number: int) -> None:
+        self.lines.append(line)
+        self.origins.append((file, number))
+
+    def include(self, file: str) -> None:
+        if file in self.included:
             return
-        self.files.append(name)
-        index = len(self.files) - 1
-        self.lines.append(f"#line 1 {index}")
-        for number, line in enumerate(self._read(name).splitlines(), 1):
+        self.included.add(file)
+        for number, line in enumerate(self._read(file).splitlines(), 1):
             if match := _INCLUDE.match(line):
                 self.include(match[1])
-                self.lines.append(f"#line {number + 1} {index}")
             else:
-                self.lines.append(line)
+                self.add(line, file, number)
 
-    def _read(self, name: str) -> str:
-        if name in self.generated:
-            return self.generated[name]
+    def _read(self, file: str) -> str:
+        if file in self.generated:
+            return self.generated[file]
         try:
-            return (SHADERS / name).read_text(encoding="utf-8")
+            return (SHADERS / file).read_text(encoding="utf-8")
         except OSError as error:
-            raise ShaderError(f"{name}: no such shader in {SHADERS.name}/") from error
+            raise ShaderError(f"{file}: no such shader in {SHADERS.name}/") from error
 
 
-def assemble(name: str, defines: Iterable[str] = (), generated: Mapping[str, str] | None = None) -> Source:
-    """The file `name` with its includes and `#define`s; a define is "NAME" or "NAME value"."""
+def assemble(name: str, defines: Iterable[str] = (), generated: Generated = None) -> Source:
+    """The file `name` with its includes and `#define`s; a define is "NAME" or "NAME value". Raises ShaderError."""
     assembly = _Assembly(generated or {})
+    for number, line in enumerate(["#version 450 core", *(f"#define {define}" for define in defines)], 1):
+        assembly.add(line, "<header>", number)
     assembly.include(name)
-    header = ["#version 450 core", *(f"#define {define}" for define in defines)]
-    return Source("\n".join([*header, *assembly.lines, ""]), tuple(assembly.files))
+    return Source("\n".join([*assembly.lines, ""]), tuple(assembly.origins))
 
 
 class ShaderLibrary:
@@ -81,19 +93,19 @@ class ShaderLibrary:
         self._programs: dict[tuple[str, ...], moderngl.Program] = {}
         self._compute: dict[tuple[str, ...], moderngl.ComputeShader] = {}
 
-    def program(self, *files: str, defines: Iterable[str] = (), generated: Mapping[str, str] | None = None) -> moderngl.Program:
+    def program(self, *files: str, defines: Iterable[str] = (), generated: Generated = None) -> moderngl.Program:
         """A program of one file a stage; the suffix (.vert, .frag) names the stage. Raises ShaderError."""
         sources = [assemble(name, defines, generated) for name in files]
         key = tuple(source.text for source in sources)
         if key not in self._programs:
-            stages = {_STAGES[name.rpartition(".")[2]]: source.text for name, source in zip(files, sources, strict=True)}
+            stages: dict[str, Any] = {_STAGES[source.name.rpartition(".")[2]]: source.text for source in sources}
             try:
                 self._programs[key] = self._context.program(**stages)
             except moderngl.Error as error:
                 raise ShaderError(_readable(str(error), sources)) from error
         return self._programs[key]
 
-    def compute(self, name: str, defines: Iterable[str] = (), generated: Mapping[str, str] | None = None) -> moderngl.ComputeShader:
+    def compute(self, name: str, defines: Iterable[str] = (), generated: Generated = None) -> moderngl.ComputeShader:
         """A compute program. Raises ShaderError."""
         source = assemble(name, defines, generated)
         if (source.text,) not in self._compute:
@@ -105,7 +117,8 @@ class ShaderLibrary:
 
 
 def _readable(message: str, sources: list[Source]) -> str:
-    """moderngl names the stage of a failing shader in its message; that stage's source names the lines."""
-    stage = next((s for s in sources if s.files[0].rpartition(".")[2] in message.lower()[:200]), sources[-1])
-    lines = [line for line in stage.locate(message).splitlines() if "error" in line.lower()]
-    return f"{stage.files[0]}: " + "; ".join(lines or [message])
+    """moderngl heads its message with the stage that failed; that stage's source names the lines."""
+    stages = {_STAGES.get(source.name.rpartition(".")[2], ""): source for source in sources}
+    source = next((s for stage, s in stages.items() if stage and stage in message), sources[-1])
+    lines = [line.strip() for line in source.locate(message).splitlines() if "error" in line.lower()]
+    return f"{source.name}: " + "; ".join(lines or [message])

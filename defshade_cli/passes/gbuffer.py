@@ -49,7 +49,9 @@ class GBufferPass:
     def __init__(self, gpu: Gpu, variant: GBufferVariant) -> None:
         generated = {"generated/planes.glsl": write_source(variant.planes, variant.layout)}
         self._context = gpu.context
-        self._program = gpu.shaders.program("gbuffer.vert", "gbuffer.frag", defines=variant.defines, generated=generated)
+        self._program = gpu.shaders.program(
+            "gbuffer.vert", "gbuffer.frag", defines=variant.defines, generated=generated
+        )
 
     def draw(self, draws: DrawList, gbuffer: GBuffer) -> None:
         """All of `draws` with the bound View, one multi-draw; both sides of every face."""

@@ -82,7 +82,9 @@ class LightingPass:
             self._draw_volumes(volume, array, gbuffer, kinds.index(volume), kinds.count(volume))
         self._context.disable_direct(DEPTH_CLAMP)
 
-    def _draw_volumes(self, volume: Volume, array: moderngl.VertexArray, gbuffer: GBuffer, first: int, count: int) -> None:
+    def _draw_volumes(
+        self, volume: Volume, array: moderngl.VertexArray, gbuffer: GBuffer, first: int, count: int
+    ) -> None:
         local = moderngl.DEPTH_TEST | moderngl.CULL_FACE
         self._context.enable_only(moderngl.BLEND | (moderngl.NOTHING if volume == "quad" else local))
         self._bind(array.program, gbuffer)
@@ -92,7 +94,7 @@ class LightingPass:
     def _bind(self, program: moderngl.Program, gbuffer: GBuffer) -> None:
         planes = {"depth": gbuffer.target.depth, **gbuffer.target.textures}
         for unit, (name, texture) in enumerate(planes.items()):
-            if f"plane_{name}" in program:
+            if texture and f"plane_{name}" in program:
                 texture.use(unit)
                 program[f"plane_{name}"] = unit
 

@@ -65,7 +65,7 @@ class Pipeline:
             lighting.draw(plan.lights, gbuffer, sample)
             if plan.samples > 1:
                 self._accumulation.add(sample, total)
-        return total.read("radiance") / np.float32(plan.samples)
+        return np.divide(total.read("radiance"), plan.samples, dtype=np.float32)
 
     def _data_planes(self, draws: DrawList, plan: Plan) -> Planes:
         """Planes for the data layers: the beauty's own where it drew them in float at the pixels' centres."""

@@ -63,7 +63,9 @@ PLANES: tuple[Plane, ...] = (
         {
             "rgba8": Encoding("f1", "vec4(s.base, s.metallic)", f"s.base = t.rgb; {_BASE_READ}"),
             "packed": Encoding(
-                "f1", "vec4(srgb_from_linear(s.base), s.metallic)", f"s.base = linear_from_srgb(t.rgb); {_BASE_READ}"
+                "f1",
+                "vec4(srgb_from_linear(s.base), s.metallic)",
+                f"s.base = linear_from_srgb(t.rgb); {_BASE_READ}",
             ),
             "float": Encoding("f4", "vec4(s.base, s.metallic)", f"s.base = t.rgb; {_BASE_READ}"),
         },
@@ -106,7 +108,10 @@ PLANES: tuple[Plane, ...] = (
     Plane(
         "clearcoat",
         2,
-        _encodings("vec4(s.clearcoat, s.clearcoat_roughness, 0.0, 0.0)", "s.clearcoat = t.x; s.clearcoat_roughness = t.y;"),
+        _encodings(
+            "vec4(s.clearcoat, s.clearcoat_roughness, 0.0, 0.0)",
+            "s.clearcoat = t.x; s.clearcoat_roughness = t.y;",
+        ),
         lambda material: material.clearcoat > 0.0,
     ),
 )

@@ -1,4 +1,4 @@
-"""Meshes that hold a light's reach: convex, outside the exact shape everywhere, wound counter-clockwise from outside."""
+"""Meshes that hold a light's reach: convex, nowhere inside the exact shape, counter-clockwise seen from outside."""
 
 from __future__ import annotations
 
@@ -75,7 +75,9 @@ def _icosahedron() -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
     return corners / np.linalg.norm(corners, axis=1, keepdims=True), triangles
 
 
-def _subdivided(corners: NDArray[np.float64], triangles: NDArray[np.uint32]) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
+def _subdivided(
+    corners: NDArray[np.float64], triangles: NDArray[np.uint32]
+) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
     """Each face in four, new corners on the unit sphere and shared between neighbours."""
     edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     unique, inverse = np.unique(edges, axis=0, return_inverse=True)

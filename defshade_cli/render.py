@@ -1,0 +1,151 @@
+"""The story of one job: stage → scene → plan → film → files, frame by frame."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from defshade_cli import __version__
+from defshade_cli.errors import OutputError, UsageError
+from defshade_cli.farm.names import expand, has_frame_token
+from defshade_cli.gpu.context import Gpu
+from defshade_cli.image.files import check_writable, write
+from defshade_cli.image.film import Film
+from defshade_cli.passes.pipeline import Pipeline
+from defshade_cli.plan import Plan, make_plan
+from defshade_cli.scene.scene import Scene
+from defshade_cli.settings import RenderJob, RenderSettings
+from defshade_cli.usd.reader import StageReader
+from defshade_cli.usd.stage import open_stage
+
+log = logging.getLogger("defshade")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameResult:
+    """What became of one frame.
+
+    paths: the files written, or found where `skipped`.  film, plan: None where skipped.
+    seconds: wall time per step: open and context (first frame only), read, plan, draw, write.
+    """
+
+    frame: float | None
+    paths: tuple[Path, ...]
+    skipped: bool = False
+    film: Film | None = None
+    plan: Plan | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+def run(job: RenderJob, *, command: str = "") -> Iterator[FrameResult]:
+    """Render the job's frames in order, lazily. `command` goes into the files' headers.
+
+    Raises the errors of errors.py; whatever was yielded before is complete on disk.
+    """
+    seconds: dict[str, float] = {}
+    with _timed(seconds, "open"):
+        reader = _reader(job)
+    frames = job.frames or (reader.first_frame(),)
+    _check_output(job, frames)
+    with _timed(seconds, "context"):
+        gpu = Gpu(job.device)
+    with gpu:
+        pipeline = Pipeline(gpu)
+        for frame in frames:
+            yield _render_frame(job, frame, reader, pipeline, command, seconds)
+            seconds = {}
+
+
+def frames_of(job: RenderJob) -> tuple[float | None, ...]:
+    """The frames that `run` renders. Raises StageError."""
+    return job.frames or (_reader(job).first_frame(),)
+
+
+def examine(job: RenderJob) -> tuple[Scene, Plan]:
+    """Read and plan the first frame; render nothing. Raises StageError, UsageError."""
+    reader = _reader(job)
+    scene = reader.read(job.frames[0] if job.frames else reader.first_frame())
+    return scene, make_plan(scene, job.settings)
+
+
+def render(stage: str | Path, *, camera: str | None = None, frame: float | None = None, **options: Any) -> Film:
+    """Render one frame of a stage in memory.
+
+    options: fields of RenderSettings, e.g. size=(640, 360), samples=16, layers=("beauty", "depth").
+    Raises UsageError for an unknown option, StageError, GpuError.
+    """
+    known = {f.name for f in fields(RenderSettings)}
+    if unknown := sorted(options.keys() - known):
+        raise UsageError(f"no render option named {', '.join(unknown)}; there are {', '.join(sorted(known))}")
+    job = RenderJob(Path(stage), (frame,) if frame is not None else (), camera, RenderSettings(**options))
+    result = next(run(job))
+    assert result.film is not None
+    return result.film
+
+
+def _reader(job: RenderJob) -> StageReader:
+    return StageReader(open_stage(job.stage), camera=job.camera, purposes=job.settings.purposes)
+
+
+def _render_frame(
+    job: RenderJob,
+    frame: float | None,
+    reader: StageReader,
+    pipeline: Pipeline,
+    command: str,
+    seconds: dict[str, float],
+) -> FrameResult:
+    targets = _targets(job, frame, reader.camera_name)
+    if existing := [path for path in targets if path.exists()]:
+        if job.output.existing == "error":
+            raise OutputError(f"{existing[0]} exists, and --existing error was asked")
+        if job.output.existing == "skip" and len(existing) == len(targets):
+            return FrameResult(frame, targets, skipped=True, seconds=seconds)
+    with _timed(seconds, "read"):
+        scene = reader.read(frame)
+    with _timed(seconds, "plan"):
+        plan = make_plan(scene, job.settings)
+    with _timed(seconds, "draw"):
+        film = pipeline.render(scene, plan)
+    film = replace(film, metadata=_provenance(job, plan, command, seconds["draw"]))
+    with _timed(seconds, "write"):
+        paths = tuple(path for target in targets for path in write(film, job.output, target))
+    return FrameResult(frame, paths, film=film, plan=plan, seconds=seconds)
+
+
+def _targets(job: RenderJob, frame: float | None, camera: str) -> tuple[Path, ...]:
+    patterns = job.output.patterns
+    return tuple(expand(pattern, frame=frame, scene=job.stage.stem, camera=camera) for pattern in patterns)
+
+
+def _check_output(job: RenderJob, frames: tuple[float | None, ...]) -> None:
+    """Say before the first frame what would go wrong after it."""
+    for pattern in job.output.patterns:
+        if len(frames) > 1 and not has_frame_token(pattern):
+            raise UsageError(f"{len(frames)} frames would overwrite each other in {pattern}; put #### in its name")
+    for path in _targets(job, frames[0], "camera"):
+        check_writable(path)
+
+
+def _provenance(job: RenderJob, plan: Plan, command: str, seconds: float) -> dict[str, Any]:
+    return {
+        "version": __version__,
+        "command": command,
+        "stage": job.stage.name,
+        "samples": plan.samples,
+        "layout": plan.layout,
+        "shading": plan.shading,
+        "seconds": round(seconds, 4),
+    }
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], step: str) -> Iterator[None]:
+    start = time.perf_counter()
+    yield
+    seconds[step] = time.perf_counter() - start
