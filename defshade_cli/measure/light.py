@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def irradiance_at(light: Light, positions: Array) -> tuple[Array, Array]:
-    """At world-space `positions` (P, 3): unit directions to the light, and the irradiance (P, 3) facing it."""
+    """At world-space `positions` (P, 3): unit directions to the light; the irradiance facing it, (P, 3)."""
     if isinstance(light, DistantLight):
         shape = positions.shape
         return np.broadcast_to(-light.axis, shape), np.broadcast_to(light.irradiance, shape)
