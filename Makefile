@@ -1,0 +1,77 @@
+# defshade: `make demo` and `make test` do all their own setting up, also on a bare Debian or Ubuntu.
+#
+#   make demo    render scenes/showcase.usda to out/
+#   make test    run the tests
+#   make lint    ruff and mypy
+#   make docs    write docs/commands.md anew from the commands
+#   make wheel   build dist/*.whl
+#   make clean   remove what was built, the virtual environment too
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := demo
+.PHONY: demo test lint docs wheel clean
+
+PYTHON ?= python3
+BIN := .venv/bin
+LIBRARIES := libEGL.so.1 libGL.so.1
+LIBRARY_PACKAGES := libegl1 libgl1 libgl1-mesa-dri
+
+# $(call apt_install,PACKAGES): with apt, as root or through sudo without a password; else say what to type.
+define apt_install
+	if ! command -v apt-get >/dev/null; then \
+		echo "defshade: error: please install what Debian calls: $(1)" >&2; exit 1; fi; \
+	if [ "$$(id -u)" = 0 ]; then as_root=; \
+	elif sudo -n true 2>/dev/null; then as_root="sudo -n"; \
+	else echo "defshade: error: please run 'sudo apt-get install $(1)', then make again" >&2; exit 1; fi; \
+	echo "defshade: installing $(1)"; \
+	$$as_root apt-get update -qq; \
+	$$as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(1)
+endef
+
+demo: .venv/.ready
+	mkdir -p out
+	$(BIN)/defshade render scenes/showcase.usda -o out/showcase.exr -o out/showcase.png
+	echo "defshade: the demo is out/showcase.png, and scene-linear in out/showcase.exr"
+
+test: .venv/.ready-dev
+	$(BIN)/pytest -q
+
+lint: .venv/.ready-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+docs: .venv/.ready
+	$(BIN)/python -m defshade_cli.cli.reference > docs/commands.md
+
+wheel: .venv/.ready
+	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
+	ls dist/*.whl
+
+clean:
+	rm -rf .venv out dist build .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# The stamps: quick when nothing changed, made anew when the dependencies did.
+.venv/.ready: pyproject.toml | .venv/bin/pip libraries
+	echo "defshade: installing into .venv"
+	$(BIN)/pip install --quiet --editable .
+	touch $@
+
+.venv/.ready-dev: .venv/.ready
+	$(BIN)/pip install --quiet --editable '.[dev]'
+	touch $@
+
+.venv/bin/pip:
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "defshade: error: Python 3.11 or newer is needed")'
+	$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { $(call apt_install,python3-venv); }
+	$(PYTHON) -m venv .venv
+
+.PHONY: libraries
+libraries:
+	$(PYTHON) -c 'import ctypes, sys; [ctypes.CDLL(name) for name in sys.argv[1:]]' $(LIBRARIES) 2>/dev/null || \
+	{ $(call apt_install,$(LIBRARY_PACKAGES)); }
+
+$(VERBOSE).SILENT:

@@ -1,0 +1,73 @@
+"""The command line: the only package that speaks click and rich.
+
+    options    what commands share, and the RenderJob it becomes
+    render gbuffer inspect compare doctor    one command each
+    progress   the ways of telling how far a job is    stats    the record that --stats writes
+    reference  docs/commands.md, from the commands themselves
+
+A command builds a job, calls one function and prints: results to stdout; progress, logs and errors to stderr.
+What loads a driver or a foreign library is imported inside the command that needs it, so `--help` is quick.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from defshade_cli import __version__
+from defshade_cli.cli.compare import compare
+from defshade_cli.cli.doctor import doctor
+from defshade_cli.cli.gbuffer import gbuffer
+from defshade_cli.cli.inspect import inspect
+from defshade_cli.cli.render import render
+from defshade_cli.errors import DefshadeError, UsageError
+
+INTERRUPTED = 130  # 128 + SIGINT, as shells have it
+
+_HELP = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
+_CODES = """\b
+Exit codes: 0 done, 1 compare over the threshold, 2 usage, 3 the stage, 4 the GPU, 5 a file,
+6 some frames of a batch failed, 130 interrupted."""
+
+
+@click.group(context_settings=_HELP, epilog=_CODES, invoke_without_command=True)
+@click.version_option(__version__, prog_name="defshade")
+@click.pass_context
+def defshade(context: click.Context) -> None:
+    """Headless, deferred batch renderer for USD stages.
+
+    `defshade COMMAND --help` has the options of a command and examples.
+    """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help(), err=True)
+        context.exit(UsageError.exit_code)
+
+
+for command in (render, gbuffer, inspect, compare, doctor):
+    defshade.add_command(command)
+
+
+def main() -> None:
+    """Run the program and leave with its exit code: an error is one sentence on stderr, a bug a traceback."""
+    try:
+        status = defshade.main(prog_name="defshade", standalone_mode=False)
+    except click.Abort:
+        _leave("interrupted", INTERRUPTED)
+    except click.ClickException as error:
+        _leave(_sentence(error), error.exit_code)
+    except DefshadeError as error:
+        _leave(str(error), error.exit_code)
+    sys.exit(status)
+
+
+def _sentence(error: click.ClickException) -> str:
+    """click's message, and where the help is."""
+    context = getattr(error, "ctx", None)
+    hint = f" (see '{context.command_path} --help')" if context else ""
+    return " ".join(error.format_message().rstrip(".").split()) + hint
+
+
+def _leave(message: str, status: int) -> None:
+    click.echo(f"defshade: error: {message}", err=True)
+    sys.exit(status)

@@ -1,0 +1,5 @@
+"""`python -m defshade_cli.cli`, for where the `defshade` script is not on the path."""
+
+from defshade_cli.cli import main
+
+main()

@@ -1,0 +1,173 @@
+"""The ways of telling, on stderr, how far a job is.
+
+Farm protocols: Tractor's `ALF_PROGRESS 45%` and Open Job Description's `openjd_progress: 45.0`; both read a
+task's stdout and stderr as one.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import sys
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import click
+
+from defshade_cli.cli.options import Reporting
+from defshade_cli.errors import DefshadeError
+
+if TYPE_CHECKING:
+    from defshade_cli.render import FrameResult
+
+
+class Progress:
+    """Tells nothing: `none`, and the base of the others. A context manager around the frames of one job."""
+
+    def __init__(self, total: int) -> None:
+        self.total, self.done = total, 0
+
+    def __enter__(self) -> Self:
+        self.started()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if isinstance(error, DefshadeError):
+            self.failed(error)
+
+    def frame(self, result: FrameResult) -> None:
+        """One more frame is done."""
+        self.done += 1
+        self.finished(result)
+
+    @property
+    def percent(self) -> float:
+        return min(100.0, 100.0 * self.done / self.total)
+
+    def started(self) -> None: ...
+
+    def finished(self, result: FrameResult) -> None: ...
+
+    def failed(self, error: DefshadeError) -> None: ...
+
+
+class Lines(Progress):
+    """A line a frame, for logs."""
+
+    def finished(self, result: FrameResult) -> None:
+        paths = ", ".join(map(str, result.paths))
+        cost = "skipped" if result.skipped else f"{sum(result.seconds.values()):.2f} s"
+        _say(f"frame {frame_name(result.frame)}  → {paths}  {cost}")
+
+
+class Alf(Progress):
+    """Percentages are rounded down, so that 100 means done."""
+
+    def started(self) -> None:
+        _say("ALF_PROGRESS 0%")
+
+    def finished(self, result: FrameResult) -> None:
+        _say(f"ALF_PROGRESS {int(self.percent)}%")
+
+
+class OpenJd(Progress):
+    def started(self) -> None:
+        _say("openjd_progress: 0.0")
+
+    def finished(self, result: FrameResult) -> None:
+        _say(f"openjd_progress: {self.percent:.1f}")
+        _say(f"openjd_status: frame {frame_name(result.frame)}, {self.done} of {self.total}")
+
+    def failed(self, error: DefshadeError) -> None:
+        _say(f"openjd_fail: {error}")
+
+
+class JsonLines(Progress):
+    """One object a line: started, frame, failed."""
+
+    def started(self) -> None:
+        self._event("started")
+
+    def finished(self, result: FrameResult) -> None:
+        paths = [str(path) for path in result.paths]
+        self._event("frame", frame=result.frame, paths=paths, skipped=result.skipped, seconds=result.seconds)
+
+    def failed(self, error: DefshadeError) -> None:
+        self._event("failed", message=str(error), exit_code=error.exit_code)
+
+    def _event(self, name: str, **facts: Any) -> None:
+        _say(json.dumps({"event": name, "done": self.done, "total": self.total, **facts}))
+
+
+class Bar(Progress):
+    """A bar that redraws itself, for terminals; stdout is left alone where it is redirected."""
+
+    def __enter__(self) -> Self:
+        from rich.console import Console
+        from rich.progress import (
+            MofNCompleteColumn,
+            Progress,
+            SpinnerColumn,
+            TimeElapsedColumn,
+            TimeRemainingColumn,
+        )
+
+        columns = [
+            *Progress.get_default_columns()[:2],
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+        ]
+        console = Console(stderr=True)
+        self._bar = Progress(
+            SpinnerColumn(), *columns, console=console, transient=True, redirect_stdout=sys.stdout.isatty()
+        )
+        self._task = self._bar.add_task("rendering", total=self.total)
+        self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._bar.stop()
+
+    def finished(self, result: FrameResult) -> None:
+        self._bar.update(self._task, completed=self.done, description=f"frame {frame_name(result.frame)}")
+
+
+class _Echo(logging.Handler):
+    """Log records as lines on stderr, above the bar where there is one."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        _say(f"defshade: {record.levelname.lower()}: {record.getMessage()}")
+
+
+def make_progress(reporting: Reporting, total: int) -> Progress:
+    """The Progress that the options ask for, for `total` frames."""
+    kinds = {"bar": Bar, "alf": Alf, "openjd": OpenJd, "json": JsonLines, "none": Progress}
+    if reporting.quiet:
+        return Progress(total)
+    automatic = Bar if sys.stderr.isatty() else Lines
+    return kinds.get(reporting.progress, automatic)(total)
+
+
+def start_logging(reporting: Reporting) -> None:
+    """Show the package's log from warnings up; from errors up when quiet, everything when verbose."""
+    level = logging.ERROR if reporting.quiet else logging.DEBUG if reporting.verbose else logging.WARNING
+    logger = logging.getLogger("defshade")
+    logger.setLevel(level)
+    logger.handlers = [_Echo()]
+    logger.propagate = False
+
+
+def frame_name(frame: float | None) -> str:
+    """`7`, `7.5`, or `default`."""
+    if frame is None:
+        return "default"
+    return str(int(frame)) if frame == int(frame) else str(frame)
+
+
+def _say(line: str) -> None:
+    click.echo(line, err=True)

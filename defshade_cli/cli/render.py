@@ -1,0 +1,46 @@
+"""`defshade render`."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+
+import click
+
+from defshade_cli.cli.options import HeadedCommand, Reporting, epilog, takes_job
+from defshade_cli.cli.progress import make_progress, start_logging
+from defshade_cli.cli.stats import Stats
+from defshade_cli.settings import RenderJob
+
+_EPILOG = epilog(
+    "defshade render scene.usda",
+    "defshade render scene.usda -o out.exr -o out.png --size 1920x1080 --samples 16",
+    "defshade render shot.usd --camera /cams/main --frames 1:48 -o 'out/{scene}.####.exr'",
+    "defshade render shot.usd --layers beauty,depth,normal --split-layers",
+    "defshade render shot.usd --frames 1:240 --existing skip --progress alf --stats stats.json",
+    layers=True,
+)
+
+
+@click.command(cls=HeadedCommand, epilog=_EPILOG)
+@takes_job()
+def render(job: RenderJob, reporting: Reporting) -> None:
+    """Render SCENE, a USD stage, to image files.
+
+    The paths of the files go to stdout, one a line.
+    """
+    execute(job, reporting)
+
+
+def execute(job: RenderJob, reporting: Reporting) -> None:
+    """Render `job`, telling of it as `reporting` says."""
+    from defshade_cli.render import run
+
+    start_logging(reporting)
+    frames = max(1, len(job.frames))
+    with make_progress(reporting, frames) as progress, Stats(job, reporting.stats) as stats:
+        for result in run(job, command=shlex.join(["defshade", *sys.argv[1:]])):
+            progress.frame(result)
+            stats.add(result)
+            for path in result.paths:
+                click.echo(path)

@@ -1,0 +1,88 @@
+"""The types of option values: each turns text that a user typed into a value, or says what is wrong."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import click
+
+from defshade_cli.errors import UsageError
+
+
+class Size(click.ParamType):
+    """`1920x1080` → (1920, 1080)."""
+
+    name = "WxH"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        match = re.fullmatch(r"([1-9]\d*)x([1-9]\d*)", value)
+        if not match:
+            self.fail(f"{value!r} is not a size in pixels such as 1920x1080", param, ctx)
+        return int(match[1]), int(match[2])
+
+
+class Finite(click.ParamType):
+    """A float that is neither infinite nor NaN."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is not a finite number", param, ctx)
+        return number
+
+
+class Frames(click.ParamType):
+    """`1:10x2,15` → time codes; the syntax is farm.frames'."""
+
+    name = "frames"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+        from defshade_cli.farm.frames import parse_frames
+
+        try:
+            return tuple(parse_frames(value))
+        except UsageError as error:
+            self.fail(str(error), param, ctx)
+
+
+class Names(click.ParamType):
+    """Some of `choices`, separated by commas, each once; `all` for every one."""
+
+    name = "a,b,c"
+
+    def __init__(self, noun: str, choices: Sequence[str]) -> None:
+        self.noun, self.choices = noun, tuple(choices)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
+        if not isinstance(value, str):
+            return tuple(value)
+        if value == "all":
+            return self.choices
+        names = [name.strip() for name in value.split(",")]
+        for name in names:
+            if name not in self.choices:
+                self.fail(f"unknown {self.noun} {name!r}; {self._suggestion(name)}", param, ctx)
+        return tuple(dict.fromkeys(names))
+
+    def _suggestion(self, name: str) -> str:
+        close = difflib.get_close_matches(name, self.choices, 1)
+        return f"did you mean {close[0]!r}?" if close else f"known are {', '.join(self.choices)}"
+
+
+class Threshold(click.ParamType):
+    """`rmse=0.001`, or `0.001` for the same → ("rmse", 0.001)."""
+
+    name = "[METRIC=]VALUE"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, float]:
+        metric, _, number = value.rpartition("=")
+        return metric or "rmse", Finite().convert(number, param, ctx)

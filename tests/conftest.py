@@ -1,0 +1,41 @@
+"""Fixtures that every test file may ask for."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from defshade_cli import resources
+
+if TYPE_CHECKING:
+    from defshade_cli.gpu.context import Gpu
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def assets() -> Path:
+    """Folder of stages by others; the tests that read them are skipped where there is none."""
+    folder = Path(os.environ.get("DEFSHADE_ASSETS", ROOT.parent / "shared" / "assets"))
+    if not folder.is_dir():
+        pytest.skip("no folder of stages by others: set DEFSHADE_ASSETS")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def scenes() -> Path:
+    """Folder of this project's own stages."""
+    return resources.SCENES
+
+
+@pytest.fixture(scope="session")
+def gpu() -> Iterator[Gpu]:
+    """One GL context for the whole run."""
+    from defshade_cli.gpu.context import Gpu
+
+    with Gpu() as gpu:
+        yield gpu

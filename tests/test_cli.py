@@ -1,0 +1,306 @@
+"""The command line as a user meets it: each test is a process, judged by its exit code, stdout, stderr and files."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from defshade_cli import __version__
+
+TRIANGLE = """#usda 1.0
+(
+    startTimeCode = 1
+    endTimeCode = 3
+    metersPerUnit = 1
+    upAxis = "Y"
+)
+
+def Mesh "Triangle"
+{
+    int[] faceVertexCounts = [3]
+    int[] faceVertexIndices = [0, 1, 2]
+    point3f[] points = [(-1, -1, 0), (1, -1, 0), (0, 1, 0)]
+    uniform token subdivisionScheme = "none"
+}
+
+def Camera "Eye"
+{
+    double3 xformOp:translate = (0, 0, 10)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}
+
+def DistantLight "Sun"
+{
+    float inputs:intensity = 1
+    float inputs:angle = 0
+}
+
+def SphereLight "Dark"
+{
+    float inputs:intensity = 0
+}
+"""
+EMPTY = '#usda 1.0\n\ndef Camera "Eye"\n{\n}\n'
+SMALL = ("--size", "16x8")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working folder with two stages in `stages/`."""
+    (tmp_path / "stages").mkdir()
+    (tmp_path / "stages" / "triangle.usda").write_text(TRIANGLE)
+    (tmp_path / "stages" / "empty.usda").write_text(EMPTY)
+    (tmp_path / "stages" / "noise.usda").write_bytes(bytes(range(256)))
+    (tmp_path / "stages" / "picture.png").write_bytes(b"not a stage")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def defshade(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "defshade_cli.cli", *arguments]
+    path = os.pathsep.join([str(Path(__file__).resolve().parent.parent), os.environ.get("PYTHONPATH", "")])
+    return subprocess.run(
+        command, capture_output=True, text=True, check=False, env={**os.environ, "PYTHONPATH": path, **environment}
+    )
+
+
+def succeed(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    done = defshade(*arguments, **environment)
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def files(folder: Path) -> set[str]:
+    found = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+    return {name for name in found if not name.startswith("stages")}
+
+
+def assert_refused(done: subprocess.CompletedProcess[str], exit_code: int, mention: str) -> None:
+    """One sentence on stderr that names the culprit, nothing on stdout, and the right exit code."""
+    assert done.returncode == exit_code, done.stderr
+    lines = done.stderr.strip().splitlines()
+    assert len(lines) == 1, done.stderr
+    assert lines[0].startswith("defshade: error: ")
+    assert mention in lines[0]
+    assert not done.stdout
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["render", "--help"], ["gbuffer", "--help"], ["--version"]])
+def test_help_loads_no_foreign_library(arguments: list[str]) -> None:
+    code = (
+        "import sys, atexit\n"
+        f"sys.argv = ['defshade', *{arguments}]\n"
+        "heavy = {'pxr', 'moderngl', 'OpenImageIO', 'numpy', 'scipy', 'colour', 'rich'}\n"
+        "atexit.register(lambda: print('loaded:', sorted(heavy & sys.modules.keys())))\n"
+        "from defshade_cli.cli import main\n"
+        "main()\n"
+    )
+    root = Path(__file__).resolve().parent.parent
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root)
+    assert done.stdout.strip().endswith("loaded: []")
+
+
+def test_version() -> None:
+    assert succeed("--version").stdout.split()[-1] == __version__
+
+
+@pytest.mark.parametrize(
+    ("exit_code", "mention", "arguments"),
+    [
+        pytest.param(2, "--sample", ["render", "s.usda", "--sample", "4"], id="unknown option"),
+        pytest.param(2, "paint", ["paint", "s.usda"], id="unknown command"),
+        pytest.param(2, "SCENE", ["render"], id="no scene"),
+        pytest.param(2, "depht", ["render", "s.usda", "--layers", "beauty,depht"], id="unknown layer"),
+        pytest.param(2, "'depth'", ["render", "s.usda", "--layers", "beauty,depht"], id="layer suggested"),
+        pytest.param(2, "--width", ["render", "s.usda", "--size", "8x8", "--width", "8"], id="size and width"),
+        pytest.param(2, "--default-time", ["render", "s.usda", "--frames", "1", "--default-time"], id="two times"),
+        pytest.param(2, "--frames", ["render", "s.usda", "--frames", "one"], id="frames that are not"),
+        pytest.param(2, "1-10:2", ["render", "s.usda", "--frames", "1-10:2"], id="frames with two meanings"),
+        pytest.param(2, "1920", ["render", "s.usda", "--size", "1920"], id="size without height"),
+        pytest.param(2, "0x8", ["render", "s.usda", "--size", "0x8"], id="size of nothing"),
+        pytest.param(2, "nan", ["render", "s.usda", "--exposure", "nan"], id="exposure that is not a number"),
+        pytest.param(2, "0", ["render", "s.usda", "--samples", "0"], id="no samples"),
+        pytest.param(2, "proxies", ["render", "s.usda", "--purposes", "proxies"], id="unknown purpose"),
+        pytest.param(3, "missing.usda", ["render", "missing.usda"], id="no such stage"),
+        pytest.param(3, "missing.usda", ["inspect", "missing.usda"], id="no such stage to inspect"),
+        pytest.param(3, "noise.usda", ["render", "stages/noise.usda"], id="not USD inside"),
+        pytest.param(3, "picture.png", ["render", "stages/picture.png"], id="not USD at all"),
+        pytest.param(3, "stages", ["render", "stages"], id="a folder"),
+        pytest.param(3, "empty", ["render", "stages/empty.usda"], id="no geometry"),
+        pytest.param(3, "Ear", ["render", "stages/triangle.usda", "--camera", "Ear"], id="unknown camera"),
+        pytest.param(3, "/Triangle", ["render", "stages/triangle.usda", "--camera", "/Triangle"], id="not a camera"),
+        pytest.param(
+            2, "out.exr", ["render", "stages/triangle.usda", "--frames", "1:3", "-o", "out.exr"], id="no token"
+        ),
+        pytest.param(5, "out.xyz", ["render", "stages/triangle.usda", "-o", "out.xyz"], id="unknown format"),
+        pytest.param(5, "stats.json", ["render", "stages/triangle.usda", "--stats", "no/stats.json"], id="stats"),
+        pytest.param(5, "missing.exr", ["compare", "missing.exr", "missing.exr"], id="nothing to compare"),
+    ],
+)
+def test_wrong_use_is_refused(folder: Path, exit_code: int, mention: str, arguments: list[str]) -> None:
+    assert_refused(defshade(*arguments), exit_code, mention)
+    assert not files(folder)
+
+
+def test_unknown_display_is_refused(folder: Path) -> None:
+    done = defshade("render", "stages/triangle.usda", *SMALL, "-o", "out.png", "--display", "Radio")
+    assert_refused(done, 2, "Radio")
+    assert not files(folder)
+
+
+def test_output_under_a_file_is_refused(folder: Path) -> None:
+    """Root may write anywhere, so the folder of the output is a file here."""
+    Path("plain").write_text("a file")
+    done = defshade("render", "stages/triangle.usda", *SMALL, "-o", "plain/out.exr")
+    assert_refused(done, 5, "plain")
+    assert files(folder) == {"plain"}
+
+
+def test_existing_file_is_kept_when_asked(folder: Path) -> None:
+    Path("triangle.exr").write_text("precious")
+    assert_refused(defshade("render", "stages/triangle.usda", *SMALL, "--existing", "error"), 5, "triangle.exr")
+    assert Path("triangle.exr").read_text() == "precious"
+
+
+NO_GL = {
+    "no libEGL": {"DEFSHADE_LIBEGL": "libEGL-that-is-not-installed.so.1"},
+    "no driver": {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent.json"},
+}
+
+
+@pytest.mark.parametrize("environment", NO_GL.values(), ids=NO_GL.keys())
+def test_without_egl_a_render_says_what_to_install(folder: Path, environment: dict[str, str]) -> None:
+    done = defshade("render", "stages/triangle.usda", *SMALL, **environment)
+    assert_refused(done, 4, "libegl1 libgl1 libgl1-mesa-dri")
+    assert not files(folder)
+
+
+@pytest.mark.parametrize("environment", NO_GL.values(), ids=NO_GL.keys())
+def test_without_egl_the_doctor_says_what_to_install(environment: dict[str, str]) -> None:
+    done = defshade("doctor", **environment)
+    assert done.returncode == 4
+    assert "apt-get install" in done.stderr
+    assert "libegl1 libgl1 libgl1-mesa-dri" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_inspect_needs_no_egl() -> None:
+    succeed("inspect", "stages/triangle.usda", **NO_GL["no libEGL"])
+
+
+def test_doctor_finds_a_device() -> None:
+    done = succeed("doctor")
+    assert re.search(r"device 0 .*OpenGL", done.stdout)
+    assert __version__ in done.stdout
+
+
+def test_render_writes_what_it_prints(folder: Path) -> None:
+    done = succeed("render", "stages/triangle.usda", *SMALL, "-o", "out/{scene}.exr", "-o", "out/{scene}.png")
+    assert files(folder) == {"out/triangle.exr", "out/triangle.png"}
+    assert done.stdout.split() == ["out/triangle.exr", "out/triangle.png"]
+    assert re.fullmatch(r"frame 1  → out/triangle.exr, out/triangle.png  \d+\.\d\d s\n", done.stderr)
+
+
+def test_quiet_leaves_only_results() -> None:
+    done = succeed("render", "stages/triangle.usda", *SMALL, "--quiet")
+    assert done.stdout.split() == ["triangle.exr"]
+    assert not done.stderr
+
+
+def test_several_frames_are_numbered_by_default(folder: Path) -> None:
+    succeed("gbuffer", "stages/triangle.usda", *SMALL, "--frames", "1:3x2", "--quiet")
+    assert files(folder) == {"triangle.gbuffer.0001.exr", "triangle.gbuffer.0003.exr"}
+
+
+def test_skip_renders_only_what_is_missing(folder: Path) -> None:
+    arguments = ("render", "stages/triangle.usda", *SMALL, "--existing", "skip")
+    succeed(*arguments, "--frames", "2", "-o", "f.####.exr")
+    before = (folder / "f.0002.exr").stat().st_mtime_ns
+    done = succeed(*arguments, "--frames", "1:2", "-o", "f.####.exr")
+    assert files(folder) == {"f.0001.exr", "f.0002.exr"}
+    assert (folder / "f.0002.exr").stat().st_mtime_ns == before
+    assert "frame 2  → f.0002.exr  skipped" in done.stderr
+
+
+PROTOCOLS = {
+    "alf": ["ALF_PROGRESS 0%", "ALF_PROGRESS 33%", "ALF_PROGRESS 66%", "ALF_PROGRESS 100%"],
+    "openjd": [
+        "openjd_progress: 0.0",
+        "openjd_progress: 33.3",
+        "openjd_status: frame 1, 1 of 3",
+        "openjd_progress: 66.7",
+        "openjd_status: frame 2, 2 of 3",
+        "openjd_progress: 100.0",
+        "openjd_status: frame 3, 3 of 3",
+    ],
+    "none": [],
+}
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_progress_protocols(protocol: str) -> None:
+    done = succeed("render", "stages/triangle.usda", *SMALL, "--frames", "1:3", "--progress", protocol)
+    assert done.stderr.splitlines() == PROTOCOLS[protocol]
+
+
+def test_json_progress_is_a_line_a_frame() -> None:
+    done = succeed("render", "stages/triangle.usda", *SMALL, "--frames", "1:2", "--progress", "json")
+    events = [json.loads(line) for line in done.stderr.splitlines()]
+    assert [(e["event"], e["done"], e["total"]) for e in events] == [
+        ("started", 0, 2),
+        ("frame", 1, 2),
+        ("frame", 2, 2),
+    ]
+    assert events[1]["paths"] == ["triangle.0001.exr"]
+
+
+def test_a_failure_is_told_to_the_farm() -> None:
+    done = defshade("render", "missing.usda", "--progress", "openjd")
+    assert done.returncode == 3
+    assert any(line.startswith("openjd_fail: ") for line in done.stderr.splitlines())
+
+
+def test_stats_record_what_was_done() -> None:
+    succeed("render", "stages/triangle.usda", *SMALL, "--layers", "beauty,depth", "--stats", "stats.json", "--quiet")
+    record = json.loads(Path("stats.json").read_text())
+    frame = record["frames"][0]
+    assert record["version"] == __version__
+    assert record["job"]["settings"]["size"] == [16, 8]
+    assert frame["paths"] == ["triangle.exr"]
+    assert {"read", "draw", "write"} <= frame["seconds"].keys()
+    assert frame["decisions"]
+    assert frame["layers"]["depth"]["min"] == pytest.approx([10.0], rel=1e-5)
+    assert 0.0 < frame["layers"]["depth"]["finite"] < 1.0
+
+
+def test_inspect_shows_what_is_there() -> None:
+    shown = succeed("inspect", "stages/triangle.usda", "--plan").stdout
+    assert "/Eye  ← selected" in shown
+    assert "/Sun  distant → quad" in shown
+    assert "/Dark  sphere, gives no light" in shown
+    assert "1 triangles" in shown
+
+
+def test_inspect_as_json() -> None:
+    record = json.loads(succeed("inspect", "stages/triangle.usda", "--json", *SMALL).stdout)
+    assert record["camera"] == "/Eye"
+    assert record["geometry"] == {"meshes": 1, "instances": 1, "triangles": 1}
+    assert record["lights"][0] == {"path": "/Sun", "kind": "distant", "volume": "quad", "reach": None}
+    assert record["plan"]["size"] == [16, 8]
+
+
+def test_compare_ends_with_one_over_the_threshold() -> None:
+    for name, stops in (("a.exr", "0"), ("b.exr", "1")):
+        succeed("render", "stages/triangle.usda", *SMALL, "--exposure", stops, "-o", name, "--quiet")
+    assert succeed("compare", "a.exr", "a.exr", "--threshold", "0").stdout
+    different = defshade("compare", "a.exr", "b.exr", "--threshold", "1e-4")
+    assert different.returncode == 1
+    assert "Traceback" not in different.stderr
+    record = json.loads(succeed("compare", "a.exr", "b.exr", "--json").stdout)
+    assert record["layers"]["beauty"]["rmse"] > 1e-4
