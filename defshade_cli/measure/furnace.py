@@ -5,6 +5,7 @@ A model conserves energy where this directional albedo is at most 1 for every vi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -17,10 +18,10 @@ Reflect = Callable[[Surface, NDArray[np.float64]], NDArray[np.float64]]
 """(surface of P points, light directions (P, 3)) → (P, 3) f · NoL."""
 
 
-def directional_albedo(reflect: Reflect, material: Surface, cos_view: float, *, points: int = 256) -> Array:
+def directional_albedo(reflect: Reflect, material: Surface, cos_view: float, *, points: int = 1 << 15) -> Array:
     """(3,) ∫ f NoL dl over the hemisphere, the surface seen at `cos_view` from its normal.
 
-    material: one point, whose roughness picks the quadrature. Two sets of `points`² directions,
+    material: one point, whose roughness picks the quadrature. Two sets of `points` directions,
     cosine-weighted ones and reflections at GGX half vectors, are joined by the balance heuristic (Veach 1997,
     sec. 9.2.2), so that lobes of any width converge.
     """
@@ -33,7 +34,7 @@ def directional_albedo(reflect: Reflect, material: Surface, cos_view: float, *, 
     noh, voh = half[:, 2], half @ view
     density = directions[:, 2] / np.pi + D_GGX(alpha, noh) * noh / (4.0 * voh)
     reflected = reflect(seen_from(material, view, len(directions)), directions)
-    return (reflected / density[:, None]).sum(axis=0) / points**2
+    return (reflected / density[:, None]).sum(axis=0) / points
 
 
 def seen_from(material: Surface, view: Array, count: int) -> Surface:
@@ -65,10 +66,11 @@ def _point(base: float, metallic: float, roughness: float, f0: float, f90: float
     )  # fmt: skip
 
 
-def _unit_square(points: int) -> tuple[Array, Array]:
-    midpoints = (np.arange(points) + 0.5) / points
-    u, phi = np.meshgrid(midpoints, 2.0 * np.pi * midpoints, indexing="ij")
-    return u.ravel(), phi.ravel()
+def _fibonacci_lattice(points: int) -> tuple[Array, Array]:
+    """u in (0, 1) and an angle in [0, 2π): evenly spread, and along no edge of what is integrated."""
+    index = np.arange(points)
+    turn = 2.0 / (1.0 + math.sqrt(5.0))
+    return (index + 0.5) / points, 2.0 * np.pi * np.modf(index * turn)[0]
 
 
 def _spherical(cos_theta: Array, phi: Array) -> Array:
@@ -77,12 +79,12 @@ def _spherical(cos_theta: Array, phi: Array) -> Array:
 
 
 def _cosine_directions(points: int) -> Array:
-    u, phi = _unit_square(points)
+    u, phi = _fibonacci_lattice(points)
     return _spherical(np.sqrt(u), phi)
 
 
 def _lobe_directions(points: int, alpha: Array, view: Array) -> Array:
     """`view` mirrored at half vectors distributed as D · NoH (Walter et al. 2007, eq. 35)."""
-    u, phi = _unit_square(points)
+    u, phi = _fibonacci_lattice(points)
     half = _spherical(1.0 / np.sqrt(1.0 + alpha**2 * u / (1.0 - u)), phi)
     return 2.0 * (half @ view)[:, None] * half - view
