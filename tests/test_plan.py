@@ -1,0 +1,110 @@
+"""The plan: what a frame needs, what it skips."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from build import GREY, bulb, camera, drawable, quad, scene, sphere, sun
+
+from defshade_cli.errors import UsageError
+from defshade_cli.passes.accumulation import pixel_positions
+from defshade_cli.passes.view import camera_depth, clip_from_camera
+from defshade_cli.plan import image_size, make_plan
+from defshade_cli.scene.camera import Camera
+from defshade_cli.settings import RenderSettings
+from defshade_cli.spaces import translation
+
+SCENE = scene([sphere()], [sun(), bulb(0, 0, 2), bulb(0, 1, 2, cone=30.0)])
+
+
+def choices(**options: object) -> dict[str, str]:
+    plan = make_plan(SCENE, RenderSettings(**options))  # type: ignore[arg-type]
+    return {decision.subject: decision.choice for decision in plan.decisions}
+
+
+def test_every_plane_and_volume_is_decided_with_a_reason() -> None:
+    plan = make_plan(SCENE, RenderSettings())
+    subjects = {d.subject for d in plan.decisions}
+    assert {"layout", "plane base", "plane emission", "quad volumes", "cone volumes", "cutout"} <= subjects
+    assert all(d.reason for d in plan.decisions)
+
+
+def test_lighting_is_skipped_when_no_layer_needs_it() -> None:
+    plan = make_plan(SCENE, RenderSettings(layers=("depth", "normal")))
+    assert choices(layers=("depth", "normal"))["lighting"] == "skipped"
+    assert not any("light" in name for name in plan.passes)
+
+
+def test_one_float_sample_serves_data_and_beauty() -> None:
+    assert not make_plan(SCENE, RenderSettings(layers=("beauty", "depth"))).data_pass
+    for options in ({"samples": 4}, {"layout": "rgba8"}):
+        assert make_plan(SCENE, RenderSettings(layers=("beauty", "depth"), **options)).data_pass  # type: ignore[arg-type]
+
+
+def test_lights_without_power_are_dropped() -> None:
+    dark = replace(SCENE, lights=(*SCENE.lights, bulb(0, 0, 2, intensity=0.0)))
+    assert len(make_plan(dark, RenderSettings()).lights) == 3
+
+
+def test_no_light_reaches_further_than_the_geometry() -> None:
+    plan = make_plan(scene([sphere()], [bulb(0, 0, 3, intensity=1e9)]), RenderSettings())
+    assert plan.lights[0].reach == pytest.approx(math.sqrt(1 + 1 + 16), rel=2e-3)
+
+
+def test_the_clipping_range_is_tightened_to_the_geometry_and_never_widened() -> None:
+    plan = make_plan(SCENE, RenderSettings())
+    assert plan.clip == pytest.approx((4.0, 6.0), rel=2e-3)
+    narrow = replace(SCENE, camera=replace(SCENE.camera, clipping_range=(4.5, 5.5)))
+    assert make_plan(narrow, RenderSettings()).clip == (4.5, 5.5)
+
+
+def test_unknown_layers_are_named() -> None:
+    with pytest.raises(UsageError, match="no layer named shininess; there are beauty, "):
+        make_plan(SCENE, RenderSettings(layers=("beauty", "shininess")))
+
+
+def test_size_follows_the_settings_then_the_stage_then_the_default() -> None:
+    staged = replace(SCENE, resolution=(320, 200))
+    assert image_size(staged, RenderSettings(size=(10, 20))) == (10, 20)
+    assert image_size(staged, RenderSettings()) == (320, 200)
+    assert image_size(SCENE, RenderSettings()) == (1920, 1080)
+    wide = replace(staged, camera=replace(SCENE.camera, window=(-1.0, 1.0, -0.5, 0.5)))
+    assert image_size(wide, RenderSettings(width=100)) == (100, 50)
+
+
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize("standard", [True, False])
+def test_stored_depth_gives_the_camera_depth_back(projection: str, standard: bool) -> None:
+    view = replace(camera(), projection=projection)  # type: ignore[arg-type]
+    clip = (0.1, 1e6)
+    z = np.geomspace(0.1, 9e5, 50)
+    points = np.column_stack([np.zeros(50), np.zeros(50), -z, np.ones(50)])
+    x = points @ clip_from_camera(view, view.window, clip, standard).T
+    stored = x[:, 2] / x[:, 3]
+    assert ((stored >= -1e-12) & (stored <= 1)).all()
+    np.testing.assert_allclose(camera_depth(view, clip, standard, stored), z, rtol=1e-6)  # 1e7 : 1 in float64
+
+
+def test_an_off_centre_window_lands_on_the_image_corners() -> None:
+    view = Camera("/c", translation(np.zeros(3)), (-0.2, 0.6, -0.1, 0.3))
+    matrix = clip_from_camera(view, view.window, (1.0, 10.0), False)
+    corners = np.array([[-0.2, -0.1, -1, 1], [0.6, 0.3, -1, 1]]) @ matrix.T
+    np.testing.assert_allclose(corners[:, :2] / corners[:, 3:], [[-1, -1], [1, 1]], atol=1e-12)
+
+
+def test_samples_are_centred_and_spread() -> None:
+    assert list(pixel_positions(1)) == [(0.5, 0.5)]
+    points = np.array(list(pixel_positions(256)))
+    counts, *_ = np.histogram2d(*points.T, bins=8, range=[[0, 1], [0, 1]])
+    assert counts.min() >= 2 and counts.max() <= 6  # 4 a cell on average
+    np.testing.assert_allclose(points.mean(0), 0.5, atol=0.01)
+
+
+def test_opacity_decides_the_cutout() -> None:
+    assert choices()["cutout"] == "skipped"
+    thin = replace(SCENE, materials=(replace(GREY, opacity=0.5),))
+    assert make_plan(thin, RenderSettings()).cutout
+    unbound = replace(GREY, uses_display_color=True)
+    see_through = replace(drawable(quad()), display_opacity=np.array([0.5], np.float32))
+    assert make_plan(scene([quad()], [], [unbound], drawables=[see_through]), RenderSettings()).cutout
