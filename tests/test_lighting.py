@@ -178,7 +178,7 @@ def test_what_the_reach_drops_stays_below_the_tolerance(pipeline: Pipeline) -> N
         plan = make_plan(of, RenderSettings(light_tolerance=tolerance))
         assert plan.lights[0].reach < make_plan(of, RenderSettings(light_tolerance=1e-30)).lights[0].reach
         dropped = exact - render(pipeline, of, light_tolerance=tolerance)
-        assert -1e-6 <= dropped.min() and dropped.max() <= tolerance
+        assert dropped.min() >= -1e-6 and dropped.max() <= tolerance
 
 
 def test_placement_moves_with_the_mesh(pipeline: Pipeline) -> None:
