@@ -19,9 +19,9 @@ _PACKAGES = ("moderngl", "usd-core", "OpenImageIO", "numpy", "scipy", "colour-sc
 @click.command(epilog=epilog("defshade doctor"))
 @click.pass_context
 def doctor(context: click.Context) -> None:
-    """Show what this machine has to render with, and the command that installs what is missing.
+    """Show what this machine can render with.
 
-    Ends with 4 where there is no graphics device that can render.
+    Versions, libraries and graphics devices, and the command that installs what is missing. Ends with 4 where there is no graphics device that can render.
     """
     from defshade_cli.gpu.context import INSTALL_HINT, describe_devices
 

@@ -21,8 +21,8 @@ _EPILOG = epilog(
 @click.command(cls=HeadedCommand, epilog=_EPILOG)
 @takes_job(layers=_DATA_LAYERS, name="{scene}.gbuffer")
 def gbuffer(job: RenderJob, reporting: Reporting) -> None:
-    """Write the data layers of SCENE: depth, position, normal and materials.
+    """Write depth, normals and materials of SCENE.
 
-    Unlit, one sample at each pixel's centre, in one multi-layer EXR. The same as render, with other defaults.
+    All data layers, unlit, one sample at each pixel's centre, in one EXR. The same as render with other defaults.
     """
     execute(job, reporting)

@@ -34,10 +34,10 @@ _EPILOG = epilog(
 @click.option("--plan", "with_plan", is_flag=True, help="Add what the renderer decides for this stage, and why.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON in place of a tree.")
 def inspect(job: RenderJob, as_json: bool, with_plan: bool) -> None:
-    """Show what a render of SCENE would see, and what it would leave out.
+    """Show what a render of SCENE would see.
 
-    Cameras, lights and the volumes they are drawn as, materials, geometry, unsupported prims. It renders
-    nothing and needs no graphics device.
+    Cameras, lights and the volumes they are drawn as, materials, geometry, and the prims that would be left out. It
+    renders nothing and needs no graphics device.
     """
     from defshade_cli.render import examine
 
