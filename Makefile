@@ -27,7 +27,7 @@ define apt_install
 	else echo "defshade: error: please run 'sudo apt-get install $(1)', then make again" >&2; exit 1; fi; \
 	echo "defshade: installing $(1)"; \
 	$$as_root apt-get update -qq; \
-	$$as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(1)
+	$$as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(1) >/dev/null
 endef
 
 demo: .venv/.ready

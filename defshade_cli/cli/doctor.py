@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import platform
 from collections.abc import Iterator
 from importlib import metadata
@@ -11,32 +12,31 @@ import click
 
 from defshade_cli import __version__
 from defshade_cli.cli.options import epilog
-from defshade_cli.errors import GpuError
+from defshade_cli.errors import GpuError, UsageError
 
 _PACKAGES = ("moderngl", "usd-core", "OpenImageIO", "numpy", "scipy", "colour-science", "click", "rich")
 
 
 @click.command(epilog=epilog("defshade doctor"))
-@click.pass_context
-def doctor(context: click.Context) -> None:
+def doctor() -> None:
     """Show what this machine can render with.
 
-    Versions, libraries and graphics devices, and the command that installs what is missing. Ends with 4 where there is no graphics device that can render.
+    Versions, libraries and graphics devices, and the command that installs what is missing. Ends with 4 where no
+    device can render.
     """
-    from defshade_cli.gpu.context import INSTALL_HINT, describe_devices
+    from defshade_cli.gpu.context import describe_devices
 
-    click.echo(f"defshade     {__version__} on Python {platform.python_version()}, {platform.platform()}")
-    click.echo(f"packages     {', '.join(_package_versions())}")
-    click.echo(f"colour       {_colour_config()}")
-    for line in _libraries():
-        click.echo(f"library      {line}")
     devices = describe_devices()
+    click.echo(f"defshade  {__version__} on Python {platform.python_version()}, {platform.platform()}")
+    click.echo(f"packages  {', '.join(_package_versions())}")
+    click.echo(f"colour    {_colour_config()}")
+    for line in _libraries():
+        click.echo(f"library   {line}")
     for device in devices:
         state = f"{device.renderer}, {device.vendor}, OpenGL {device.version}" if device.ok else device.problem
-        click.echo(f"device {device.index}     {state}")
+        click.echo(f"device {device.index}  {state}")
     if not any(device.ok for device in devices):
-        click.echo(f"no device can render; on Debian or Ubuntu:\n\n    {INSTALL_HINT}\n", err=True)
-        context.exit(GpuError.exit_code)
+        raise GpuError(f"no device can render: {devices[0].problem}")
 
 
 def _package_versions() -> Iterator[str]:
@@ -45,6 +45,18 @@ def _package_versions() -> Iterator[str]:
             yield f"{name} {metadata.version(name)}"
         except metadata.PackageNotFoundError:
             yield f"{name} missing"
+
+
+def _colour_config() -> str:
+    """Where the OCIO configuration is from, and what pictures are shown with by default."""
+    from defshade_cli.image.colour import displays, resolve_view
+
+    source = os.environ.get("OCIO", "OpenImageIO's built-in config")
+    try:
+        display, view = resolve_view(None, None)
+        return f"{source}: {display} / {view} by default, {len(displays())} displays"
+    except UsageError as error:
+        return f"{source}: {error}"
 
 
 def _libraries() -> Iterator[str]:
@@ -57,10 +69,3 @@ def _libraries() -> Iterator[str]:
             yield f"{name}: missing ({error})"
         else:
             yield f"{name}: found"
-
-
-def _colour_config() -> str:
-    """The OCIO configuration in force and its displays."""
-    from defshade_cli.image.colour import displays
-
-    return str(displays())

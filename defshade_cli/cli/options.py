@@ -228,7 +228,12 @@ def _output_options(name: str) -> list[Function]:
             default_text=str(_OUTPUT.existing),
             help="What to do with a file that is there already.",
         ),
-        option("--float", "full_float", is_flag=True, help="32-bit channels in EXR, as data layers always have."),
+        option(
+            "--float",
+            "full_float",
+            is_flag=True,
+            help="32-bit channels for colours in EXR too, as data layers always have.",
+        ),
         option(
             "--compression",
             type=click.Choice(settings.COMPRESSIONS),
