@@ -1,0 +1,152 @@
+"""How far two images are apart, layer by layer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from importlib.util import find_spec
+from math import inf, log2, log10, sqrt
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.errors import UsageError
+from defshade_cli.image.colour import BRIGHTEST, Pixels
+from defshade_cli.image.files import read
+from defshade_cli.image.layers import BEAUTY, LAYERS
+
+Image = Path | NDArray | Mapping[str, NDArray]
+"""A file, the pixels (H, W, C) of a beauty, or layers by name."""
+
+REL_MSE_EPSILON = 1e-2
+REC709_LUMINANCE = (0.2126, 0.7152, 0.0722)
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """One layer of image a against the reference b, over the values that are finite in both.
+
+    rmse: root of the mean squared difference.
+    rel_mse: mean of (a − b)² / (b² + ε), ε = 0.01 (Rousselle, Knaus, Zwicker, "Adaptive Sampling and Reconstruction
+        using Greedy Error Minimization", SIGGRAPH Asia 2011).
+    max_error: largest difference.
+    psnr: 20 log10(peak / rmse) in dB, the peak being 1 or b's largest magnitude if greater; inf for equal images.
+    flip: mean FLIP error (Andersson et al. 2020; HDR-FLIP 2021) of a colour layer; None for data, on request, and
+        where the package flip-evaluator is missing.
+    nonfinite: pixels of a and of b with a NaN or an infinity.
+    unmatched: pixels whose NaN or infinity the other image does not share. They are in none of the errors.
+    """
+
+    layer: str
+    rmse: float
+    rel_mse: float
+    max_error: float
+    psnr: float
+    flip: float | None
+    pixels: int
+    nonfinite: tuple[int, int]
+    unmatched: int
+
+    def within(self, threshold: float) -> bool:
+        """Whether the images agree to an RMSE of `threshold`; a NaN that one alone has never does."""
+        return self.unmatched == 0 and self.rmse <= threshold
+
+
+def compare(a: Image, b: Image, layers: Iterable[str] | None = None, *, flip: bool = True) -> tuple[Comparison, ...]:
+    """Compare a with the reference b over `layers`, or over those that both have.
+
+    flip: also HDR-FLIP for scene-linear images (seconds a megapixel), or LDR-FLIP for pictures, by b's suffix.
+    Raises UsageError where a layer is missing or sizes differ, OutputError for a file that cannot be read.
+    """
+    first, second = _layers_of(a), _layers_of(b)
+    display_referred = isinstance(b, Path) and b.suffix.lower() != ".exr"
+    names = tuple(layers) if layers is not None else tuple(name for name in second if name in first)
+    if not names:
+        raise UsageError(f"no layer in common: {', '.join(first)} against {', '.join(second)}")
+    results = []
+    for name in names:
+        pair = _paired(name, first, second)
+        wants_flip = flip and _has_color(name) and pair[0].shape[-1] >= 3
+        results.append(_compare(name, *pair, _flip(*pair, display_referred) if wants_flip else None))
+    return tuple(results)
+
+
+def difference(a: NDArray, b: NDArray) -> Pixels:
+    """|a − b| (H, W, C); 0 where both hold the same infinity or NaN, inf where one alone does."""
+    with np.errstate(invalid="ignore"):
+        apart = np.abs(np.asarray(a, np.float32) - np.asarray(b, np.float32))
+    same = (a == b) | (np.isnan(a) & np.isnan(b))
+    return np.where(same, np.float32(0), np.where(np.isfinite(apart), apart, np.float32(inf)))
+
+
+def _layers_of(image: Image) -> Mapping[str, NDArray]:
+    if isinstance(image, Path):
+        return read(image)
+    return image if isinstance(image, Mapping) else {BEAUTY: np.asarray(image)}
+
+
+def _paired(name: str, first: Mapping[str, NDArray], second: Mapping[str, NDArray]) -> tuple[NDArray, NDArray]:
+    """Both images' pixels, cut to the channels that both have: an opaque picture may lack alpha."""
+    for layers in (first, second):
+        if name not in layers:
+            raise UsageError(f"layer '{name}' is missing: there are {', '.join(layers)}")
+    a, b = first[name], second[name]
+    if a.shape[:2] != b.shape[:2]:
+        raise UsageError(f"{name}: {a.shape[1]}x{a.shape[0]} against {b.shape[1]}x{b.shape[0]} pixels")
+    channels = min(a.shape[2], b.shape[2])
+    return a[..., :channels], b[..., :channels]
+
+
+def _compare(name: str, a: NDArray, b: NDArray, flip: float | None) -> Comparison:
+    apart = difference(a, b)
+    odd_a, odd_b = ~np.isfinite(a), ~np.isfinite(b)
+    both = ~(odd_a | odd_b)
+    errors, reference = apart[both].astype(np.float64), b[both].astype(np.float64)
+    squares = errors**2
+    rmse = sqrt(squares.mean()) if squares.size else 0.0
+    peak = max(1.0, float(np.abs(reference).max(initial=0.0)))
+    return Comparison(
+        layer=name,
+        rmse=rmse,
+        rel_mse=float((squares / (reference**2 + REL_MSE_EPSILON)).mean()) if squares.size else 0.0,
+        max_error=float(errors.max(initial=0.0)),
+        psnr=20.0 * log10(peak / rmse) if rmse > 0 else inf,
+        flip=flip,
+        pixels=a.shape[0] * a.shape[1],
+        nonfinite=(int(odd_a.any(axis=-1).sum()), int(odd_b.any(axis=-1).sum())),
+        unmatched=int(np.isinf(apart).any(axis=-1).sum()),
+    )
+
+
+def _has_color(name: str) -> bool:
+    return name not in LAYERS or LAYERS[name].is_color
+
+
+def _flip(a: NDArray, b: NDArray, display_referred: bool) -> float | None:
+    """Mean FLIP of RGB, clamped to what it is defined for: [0, 1] in pictures, ≥ 0 in scene-linear images."""
+    if find_spec("flip_evaluator") is None:
+        return None
+    import flip_evaluator
+
+    brightest = 1.0 if display_referred else BRIGHTEST
+    test, reference = (np.nan_to_num(rgb[..., :3]).clip(0.0, brightest) for rgb in (a, b))
+    parameters = {} if display_referred else _exposures(reference)
+    mode = "LDR" if display_referred else "HDR"
+    return float(flip_evaluator.evaluate(reference, test, mode, applyMagma=False, parameters=parameters)[1])
+
+
+def _exposures(reference: NDArray) -> dict[str, float]:
+    """HDR-FLIP's range of exposures in stops, the median taken over lit pixels.
+
+    The evaluator's own median is 0 where a black background fills half the image, and it then ends the process.
+    x is where its tone curve, Narkowicz's ACES fit of 0.6 x, passes 0.85 (Andersson et al. 2021, section 4):
+    0.85 = x(2.51x + 0.03) / (x(2.43x + 0.59) + 0.14).
+    """
+    luminance = reference @ np.array(REC709_LUMINANCE)
+    lit = luminance[luminance > 0]
+    if not lit.size:
+        return {"startExposure": 0.0, "stopExposure": 0.0}
+    x = max(np.roots([2.51 - 0.85 * 2.43, 0.03 - 0.85 * 0.59, -0.85 * 0.14])) / 0.6
+    start, stop = log2(x / lit.max()), log2(x / np.median(lit))
+    return {"startExposure": start, "stopExposure": stop}
