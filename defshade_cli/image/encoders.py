@@ -23,6 +23,9 @@ EXR = ".exr"
 _BAND = 128
 """Rows interleaved at a time: a few blocks of every EXR compression, and no second copy of a large film."""
 
+_DWA_LOSSY = {"R", "G", "B", "Y"}
+"""Channel names that DWA compression blurs, 32-bit ones too: OpenEXR, ImfDwaCompressor.cpp, the channel rules."""
+
 log = logging.getLogger("defshade")
 
 
@@ -41,7 +44,9 @@ class _PictureFormat:
 
 
 _JPEG = _PictureFormat(alpha=False, hints=(("compression", "jpeg:95"), ("jpeg:subsampling", "4:4:4")), fails_badly=True)
-_TIFF = _PictureFormat("uint16", hints=(("compression", "zip"),))
+_TIFF = _PictureFormat("uint16", hints=(("compression", "zip"), ("Exif:ColorSpace", 65535)))
+"""Uncalibrated, unless the display is sRGB: an Exif block without any entry is reported as a failure."""
+
 _PICTURES = {
     ".png": _PictureFormat(hints=(("png:compressionLevel", 1),)),
     ".jpg": _JPEG,
@@ -94,9 +99,17 @@ def _exr_spec(film: Film, names: tuple[str, ...], halves: set[str], compression:
     if len(set(types)) > 1:
         spec.channelformats = tuple(oiio.TypeDesc(kind) for kind in types)
     spec.set_colorspace(RENDER_SPACE if any(LAYERS[name].is_color for name in names) else "data")
-    spec.attribute("compression", compression)
+    spec.attribute("compression", _lossless_for_data(compression, names))
     _set(spec, exr_attributes(film, names))
     return spec
+
+
+def _lossless_for_data(compression: str, names: tuple[str, ...]) -> str:
+    data = [name for name in names if not LAYERS[name].is_color and _DWA_LOSSY & set(LAYERS[name].channels)]
+    if compression != "dwaa" or not data:
+        return compression
+    log.warning("dwaa would blur the data in %s: this file is compressed with zip", ", ".join(data))
+    return "zip"
 
 
 def _write_picture(film: Film, name: str, output: OutputSettings, path: Path) -> None:
