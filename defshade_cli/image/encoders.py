@@ -56,7 +56,7 @@ _PICTURES = {
     ".webp": _PictureFormat(hints=(("compression", "lossless"),), fails_badly=True),
     ".tga": _PictureFormat(),
     ".bmp": _PictureFormat(alpha=False),
-    ".ppm": _PictureFormat(alpha=False),
+    ".ppm": _PictureFormat(alpha=False, hints=(("pnm:pfmflip", 0),)),  # else OpenImageIO writes it upside down
 }
 SUFFIXES = (EXR, *_PICTURES)
 
