@@ -172,6 +172,22 @@ def test_writing_leaves_the_film_as_it_was(tmp_path: Path) -> None:
     np.testing.assert_array_equal(frame.layers["beauty"], before)
 
 
+@pytest.mark.parametrize("suffix", [".exr", ".png"])
+@pytest.mark.parametrize("name", ["beauty", "normal", "depth"])
+def test_read_back_views_are_written_as_they_look(name: str, suffix: str, tmp_path: Path) -> None:
+    """A GPU's rows come bottom up, so that layers may be views with negative strides, or planar."""
+    values = film(name).layers[name]
+    upside_down = values[::-1].copy()[::-1]
+    planar = np.moveaxis(np.moveaxis(values, -1, 0).copy(), 0, -1)
+    frames = [replace(film(name), layers={name: each}) for each in (values, upside_down, planar)]
+    paths = [tmp_path / f"{index}{suffix}" for index in range(3)]
+    for path, frame in zip(paths, frames, strict=True):
+        files.write(frame, DEFAULT, path)
+    plain, *others = (next(iter(files.read(path).values())) for path in paths)
+    for other in others:
+        np.testing.assert_array_equal(other, plain)
+
+
 def test_light_beyond_half_is_clamped_and_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     values = np.ones((4, 4, 4))
     values[0, 0, :3] = 1e6, -1e6, np.inf

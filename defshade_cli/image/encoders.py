@@ -88,7 +88,7 @@ def _write_exr(film: Film, names: tuple[str, ...], output: OutputSettings, path:
             bottom = min(top + _BAND, spec.height)
             rows = [plane[top:bottom] for plane in planes]
             band = np.concatenate(rows, axis=-1, dtype=band_type, casting="same_kind")
-            encoder.write_scanlines(top, bottom, 0, band)
+            encoder.write_scanlines(top, bottom, 0, np.ascontiguousarray(band))
 
 
 def _exr_spec(film: Film, names: tuple[str, ...], halves: set[str], compression: str) -> oiio.ImageSpec:
@@ -126,7 +126,7 @@ def _write_picture(film: Film, name: str, output: OutputSettings, path: Path) ->
     if form.fails_badly:
         _claim(path, spec.image_bytes())
     with _encoder(path, spec) as encoder:
-        encoder.write_image(shown)
+        encoder.write_image(np.ascontiguousarray(shown))
 
 
 def _bounded(name: str, pixels: Pixels, limit: float | None) -> Pixels:

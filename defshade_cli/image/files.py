@@ -76,7 +76,7 @@ def read(path: Path) -> dict[str, Pixels]:
     layers: dict[str, Pixels] = {}
     for spec, pixels in _parts(path):
         for name, channels in _grouped(spec).items():
-            layers.setdefault(name, np.ascontiguousarray(pixels[..., channels]))
+            layers.setdefault(name, np.take(pixels, channels, axis=-1))
     return layers
 
 
