@@ -123,6 +123,8 @@ class Traversal:
             self._report(prim, *(issue.reason for issue in issues))
             if light is not None:
                 yield self._piece(prim, here, light)
+        if mode := _draw_mode(prim):
+            self._report(prim, f"draw mode {mode}: the full geometry is drawn")
         if kind is Kind.GPRIM and here.purpose in (None, *self._purposes):
             yield from self._gprim(prim, here)
         elif kind is Kind.UNDRAWN:
@@ -217,3 +219,11 @@ class Traversal:
     def _report(self, prim: Usd.Prim, *reasons: str) -> None:
         path = self._memory.shown(prim.GetPath())
         self.issues.update(dict.fromkeys(Unsupported(path, reason) for reason in reasons))
+
+
+def _draw_mode(prim: Usd.Prim) -> str | None:
+    """The draw mode that a model asks for, where it is not the full geometry."""
+    if not prim.HasAPI(UsdGeom.ModelAPI):
+        return None
+    mode = UsdGeom.ModelAPI(prim).GetModelDrawModeAttr().Get()
+    return None if mode in (UsdGeom.Tokens.inherited, UsdGeom.Tokens.default_) else str(mode)
