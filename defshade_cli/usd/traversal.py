@@ -83,9 +83,9 @@ class Traversal:
         while stack:
             prim, above = stack.pop()
             kind = self._memory.kinds.of(prim)
-            if kind is Kind.SHADING or not self._is_visible(prim):
-                continue
             here = self._stand(prim, above)
+            if kind is Kind.SHADING or here is None:
+                continue
             pieces.extend(self._own_pieces(prim, kind, here))
             if kind is Kind.POINT_INSTANCER:
                 pieces.extend(self._copies(prim, here))
@@ -100,20 +100,18 @@ class Traversal:
             pieces.extend(self._instances(sharing, found))
         return tuple(pieces)
 
-    def _is_visible(self, prim: Usd.Prim) -> bool:
+    def _stand(self, prim: Usd.Prim, above: Standing) -> Standing | None:
+        """What `prim` hands down, None where it is invisible; what is authored on other than Imageables is ignored."""
         if not prim.IsA(UsdGeom.Imageable):
-            return True
-        visibility = UsdGeom.Imageable(prim).GetVisibilityAttr()
-        if visibility.Get(self._time) != UsdGeom.Tokens.invisible:
-            return True
-        self.dormant |= visibility.ValueMightBeTimeVarying()
-        return False
-
-    def _stand(self, prim: Usd.Prim, above: Standing) -> Standing:
+            return above
+        visibility = prim.GetAttribute(UsdGeom.Tokens.visibility)
+        if visibility.Get(self._time) == UsdGeom.Tokens.invisible:
+            self.dormant |= visibility.ValueMightBeTimeVarying()
+            return None
         local, resets = self._memory.xforms.GetLocalTransformation(prim)
         root_from_prim = local if resets else local * above.root_from_prim
         purpose = prim.GetAttribute(UsdGeom.Tokens.purpose)
-        own = str(purpose.Get()) if purpose and purpose.HasAuthoredValue() else above.purpose
+        own = str(purpose.Get()) if purpose.HasAuthoredValue() else above.purpose
         return Standing(root_from_prim, resets or above.in_world, own)
 
     def _own_pieces(self, prim: Usd.Prim, kind: Kind, here: Standing) -> Iterator[Piece]:
