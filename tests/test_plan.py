@@ -8,7 +8,7 @@ import pytest
 from build import GREY, bulb, camera, drawable, quad, scene, sphere, sun
 
 from defshade_cli.errors import UsageError
-from defshade_cli.passes.accumulation import pixel_positions
+from defshade_cli.passes.accumulation import samples
 from defshade_cli.passes.view import camera_depth, clip_from_camera
 from defshade_cli.plan import image_size, make_plan
 from defshade_cli.scene.camera import Camera
@@ -94,8 +94,8 @@ def test_an_off_centre_window_lands_on_the_image_corners() -> None:
 
 
 def test_samples_are_centred_and_spread() -> None:
-    assert list(pixel_positions(1)) == [(0.5, 0.5)]
-    points = np.array(list(pixel_positions(256)))
+    assert [sample.pixel for sample in samples(1)] == [(0.5, 0.5)]
+    points = np.array([sample.pixel for sample in samples(256)])
     counts, *_ = np.histogram2d(*points.T, bins=8, range=[[0, 1], [0, 1]])
     assert counts.min() >= 2 and counts.max() <= 6  # 4 a cell on average
     np.testing.assert_allclose(points.mean(0), 0.5, atol=0.01)

@@ -15,14 +15,17 @@ from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 
-VIEW, INSTANCES, MATERIALS, LIGHTS = range(4)
+VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS = range(5)
 """Binding points of the storage buffers, as the shaders declare them."""
 
 _COMMAND = np.dtype([(name, "u4") for name in ("count", "instances", "first_index", "base_vertex", "base_instance")])
 
 
 class RecordBuffer:
-    """A storage buffer of records at one binding; it grows as it must."""
+    """A storage buffer of records at one binding; it grows as it must.
+
+    llvmpipe does not know which storage buffers its queued draws still read, so there a write waits for them.
+    """
 
     def __init__(self, gpu: Gpu, binding: int) -> None:
         self._gpu, self._binding = gpu, binding
@@ -30,6 +33,8 @@ class RecordBuffer:
 
     def write(self, records: NDArray) -> None:
         """Upload `records` and bind the buffer."""
+        if self._gpu.is_software:
+            self._gpu.context.finish()
         data = np.ascontiguousarray(records).tobytes()
         if len(data) > self._buffer.size:
             self._buffer.orphan(len(data))
