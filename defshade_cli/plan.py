@@ -61,7 +61,8 @@ class Plan:
     camera: conformed to the image.  clip: (near, far), the camera's range tightened to the geometry.
     exposure: linear, the camera's and the settings' together.
     planes: of the GBuffer; lights: sorted quads, spheres, cones.
-    shadows: some light casts them.  cutout: some opacity is below 1.  data_pass: data layers need an unjittered float GBuffer of their own.
+    shadows: some light casts them.  cutout: some opacity is below 1.
+    data_pass: data layers need an unjittered float GBuffer of their own.
     """
 
     size: tuple[int, int]

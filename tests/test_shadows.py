@@ -103,7 +103,9 @@ def test_half_opacity_casts_half_a_shadow(pipeline: Pipeline) -> None:
     sideways = replace(camera(), world_from_camera=rotated("y", 70.0) @ at(0, 0, 5.0))
     of = scene(meshes, [lamp], [WHITE, thin], sideways, placed)
     under = (slice(30, 34), slice(24, 30))
-    ratio = render(pipeline, of, samples=64)[under].mean() / render(pipeline, of, samples=64, shadows=False)[under].mean()
+    ratio = (
+        render(pipeline, of, samples=64)[under].mean() / render(pipeline, of, samples=64, shadows=False)[under].mean()
+    )
     assert ratio == pytest.approx(0.5, abs=0.05)
 
 
@@ -128,7 +130,9 @@ def test_a_disk_light_gives_its_closed_form(pipeline: Pipeline) -> None:
 def test_a_rect_light_gives_its_closed_form(pipeline: Pipeline) -> None:
     """Four quarters a x b at distance c (Howell's factor B-3), L at the corner below."""
     a, b, c = 1.0, 0.5, 1.0
-    quarter = a / math.hypot(a, c) * math.atan(b / math.hypot(a, c)) + b / math.hypot(b, c) * math.atan(a / math.hypot(b, c))
+    quarter = a / math.hypot(a, c) * math.atan(b / math.hypot(a, c)) + b / math.hypot(b, c) * math.atan(
+        a / math.hypot(b, c)
+    )
     lamp = RectLight(path="/l", world_from_light=at(0, 0, c), color=(1, 1, 1), intensity=2.0, width=2 * a, height=2 * b)
     assert irradiance(pipeline, lamp) == pytest.approx(4 * 2.0 * quarter / 2, rel=5e-3)
 

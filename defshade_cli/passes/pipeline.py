@@ -12,9 +12,9 @@ from defshade_cli.gpu.residence import LIGHTS, VIEW, DrawList, GpuScene, RecordB
 from defshade_cli.gpu.targets import Target
 from defshade_cli.image.film import Film
 from defshade_cli.passes.accumulation import CENTRE, AccumulationPass, Sample, samples
+from defshade_cli.passes.emitters import light_batches
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
-from defshade_cli.passes.emitters import light_batches
 from defshade_cli.passes.lighting import LightingPass, LightingVariant, light_records
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.shadows import ShadowPass
@@ -33,7 +33,9 @@ class Pipeline:
         self._lights = RecordBuffer(gpu, LIGHTS)
         self._gbuffer_pass = cache(lambda variant: GBufferPass(gpu, variant))
         self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant))
-        self._shadow_pass = cache(lambda cutout, color_varies: ShadowPass(gpu, cutout=cutout, color_varies=color_varies))
+        self._shadow_pass = cache(
+            lambda cutout, color_varies: ShadowPass(gpu, cutout=cutout, color_varies=color_varies)
+        )
         self._accumulation = AccumulationPass(gpu)
 
     def render(self, scene: Scene, plan: Plan) -> Film:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import moderngl
 import numpy as np
@@ -35,28 +34,38 @@ _NEAREST = 1e-4  # near plane over far plane, where nothing else bounds it
 _FACES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], np.float64)
 
 
-def shadow_cameras(
-    emitter: Emitter, shaping: Shaping | None, bounds: NDArray[np.float64], *, distant: bool
-) -> tuple[Camera, ...]:
-    """The maps' cameras: one, or the six of a cube in the shader's order. Everything is relative to the eye.
+@dataclass(frozen=True, slots=True, eq=False)
+class ShadowExtent:
+    """What the maps must see, as boxes of eight corners (8, 3) relative to the eye.
 
-    bounds: (2, 3) box around all that casts and receives.
+    receivers: around what the image may show; casters: around all geometry.
     """
-    corners = np.array(list(product(*bounds.T)))
+
+    receivers: NDArray[np.float64]
+    casters: NDArray[np.float64]
+
+
+def shadow_cameras(
+    emitter: Emitter, shaping: Shaping | None, extent: ShadowExtent, *, distant: bool
+) -> tuple[Camera, ...]:
+    """The maps' cameras: one, or the six of a cube in the shader's order; the emitter is relative to the eye."""
     if distant:
-        return (_parallel(emitter.axis, corners),)
-    far = float(np.linalg.norm(corners - emitter.position, axis=1).max()) * 1.001
-    fitted = [_around_cone(emitter, shaping, far), _around_corners(emitter.position, corners)]
+        return (_parallel(emitter.axis, extent),)
+    far = float(np.linalg.norm(extent.receivers - emitter.position, axis=1).max()) * 1.001
+    fitted = [_around_cone(emitter, shaping, far), _around_receivers(emitter.position, extent, far)]
     cameras = [camera for camera in fitted if camera is not None]
     return (min(cameras, key=_opening),) if cameras else _cube(emitter.position, far)
 
 
-def _parallel(axis: NDArray[np.float64], corners: NDArray[np.float64]) -> Camera:
-    centre = corners.mean(axis=0)
-    seen = transform_points(_looking(centre, axis, _NO_WINDOW, (0, 0)).camera_from_world, corners)
+def _parallel(axis: NDArray[np.float64], extent: ShadowExtent) -> Camera:
+    centre = extent.receivers.mean(axis=0)
+    camera_from_world = _looking(centre, axis, _NO_WINDOW, (0, 0)).camera_from_world
+    seen = transform_points(camera_from_world, extent.receivers)
+    depth = -transform_points(camera_from_world, np.concatenate([extent.receivers, extent.casters]))[:, 2]
     margin = 4.0 / RESOLUTION * float(np.ptp(seen, axis=0).max()) + 1e-12
     low, high = seen.min(axis=0) - margin, seen.max(axis=0) + margin
-    return _looking(centre, axis, (low[0], high[0], low[1], high[1]), (-high[2], -low[2]), "orthographic")
+    clip = (depth.min() - margin, depth.max() + margin)
+    return _looking(centre, axis, (low[0], high[0], low[1], high[1]), clip, "orthographic")
 
 
 def _around_cone(emitter: Emitter, shaping: Shaping | None, far: float) -> Camera | None:
@@ -66,21 +75,24 @@ def _around_cone(emitter: Emitter, shaping: Shaping | None, far: float) -> Camer
     return _looking(emitter.position, emitter.axis, (-side, side, -side, side), (_NEAREST * far, far))
 
 
-def _around_corners(position: NDArray[np.float64], corners: NDArray[np.float64]) -> Camera | None:
-    """A map that sees all corners; None where that is too wide, or the position is amid them."""
-    direction = corners.mean(axis=0) - position
+def _around_receivers(position: NDArray[np.float64], extent: ShadowExtent, far: float) -> Camera | None:
+    """A map that sees all receivers; None where that is too wide, or the position is amid them."""
+    direction = extent.receivers.mean(axis=0) - position
     if not direction.any():
         return None
-    seen = transform_points(_looking(position, direction, _NO_WINDOW, (0, 0)).camera_from_world, corners)
-    depth = -seen[:, 2]
+    camera_from_world = _looking(position, direction, _NO_WINDOW, (0, 0)).camera_from_world
+    seen = transform_points(camera_from_world, extent.receivers)
+    depth = -seen[:, 2:]
     if depth.min() <= _NEAREST * depth.max():
         return None
-    low, high = (seen[:, :2] / depth[:, None]).min(axis=0), (seen[:, :2] / depth[:, None]).max(axis=0)
+    low, high = (seen[:, :2] / depth).min(axis=0), (seen[:, :2] / depth).max(axis=0)
     if max(np.abs(low).max(), np.abs(high).max()) > math.tan(math.radians(_WIDEST_DEGREES)):
         return None
-    margin = 4.0 / RESOLUTION * (high - low)
+    margin = 4.0 / RESOLUTION * (high - low) + 1e-9
     (left, bottom), (right, top) = low - margin, high + margin
-    return _looking(position, direction, (left, right, bottom, top), (0.999 * depth.min(), 1.001 * depth.max()))
+    casters = -transform_points(camera_from_world, extent.casters)[:, 2]
+    near = max(0.999 * float(min(casters.min(), depth.min())), _NEAREST * far)
+    return _looking(position, direction, (left, right, bottom, top), (near, far))
 
 
 def _cube(position: NDArray[np.float64], far: float) -> tuple[Camera, ...]:
@@ -130,10 +142,8 @@ class ShadowPass:
         self._framebuffer = gpu.keep(gpu.context.framebuffer([], self._depth))
         self._maps = RecordBuffer(gpu, SHADOW_MAPS)
 
-    def draw(
-        self, draws: DrawList, cameras: Sequence[tuple[Camera, ...]], jitter: tuple[float, float]
-    ) -> ShadowAtlas:
-        """The maps of each light's cameras; `jitter` in texels. At most CAPACITY cameras in all; a light may have none."""
+    def draw(self, draws: DrawList, cameras: Sequence[tuple[Camera, ...]], jitter: tuple[float, float]) -> ShadowAtlas:
+        """The maps of each light's cameras, at most CAPACITY in all; a light may have none. `jitter` is in texels."""
         count = np.array([len(c) for c in cameras], np.uint32)
         first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.uint32)
         maps = [camera for light in cameras for camera in light]
@@ -166,7 +176,7 @@ class ShadowPass:
         matrix = (clip_from_light @ camera.camera_from_world).T.astype(np.float32)
         column, row = tile % TILES, tile // TILES
         self._framebuffer.viewport = (column * RESOLUTION, row * RESOLUTION, RESOLUTION, RESOLUTION)
-        self._program["clip_from_relative"].write(matrix.tobytes())
+        self._program["clip_from_relative"] = tuple(matrix.ravel().tolist())
         array.render_indirect(draws.commands)
         map_record = np.zeros((), record("ShadowMap"))
         map_record["clip_from_relative"] = matrix

@@ -12,6 +12,7 @@ from defshade_cli.scene.camera import Camera
 from defshade_cli.settings import Layout
 from defshade_cli.spaces import Matrix, Window
 
+
 def view_record(plan: Plan, layout: Layout, jitter: tuple[float, float] = (0.5, 0.5), sample: int = 0) -> NDArray:
     """(1,) View; `jitter` is the sample's place in its pixel, (0.5, 0.5) for the centre."""
     camera, standard = plan.camera, uses_standard_depth(layout)
