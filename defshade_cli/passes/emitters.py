@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.passes.accumulation import Sample
+from defshade_cli.passes.sampling import Sample
 from defshade_cli.passes.shadows import CAPACITY, ShadowExtent, shadow_cameras
 from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.scene.camera import Camera

@@ -11,12 +11,13 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.residence import LIGHTS, VIEW, DrawList, GpuScene, RecordBuffer
 from defshade_cli.gpu.targets import Target
 from defshade_cli.image.film import Film
-from defshade_cli.passes.accumulation import CENTRE, AccumulationPass, Sample, samples
+from defshade_cli.passes.accumulation import AccumulationPass
 from defshade_cli.passes.emitters import light_batches
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
 from defshade_cli.passes.lighting import LightingPass, LightingVariant, light_records
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
+from defshade_cli.passes.sampling import CENTRE, Sample, samples
 from defshade_cli.passes.shadows import ShadowPass
 from defshade_cli.passes.view import view_record
 from defshade_cli.plan import Plan
@@ -98,6 +99,6 @@ class Pipeline:
         return read_planes(gbuffer, plan)
 
     def _draw_gbuffer(self, draws: DrawList, plan: Plan, gbuffer: GBuffer, sample: Sample) -> None:
-        self._view.write(view_record(plan, gbuffer.layout, sample.pixel, sample.index))
+        self._view.write(view_record(plan, gbuffer.layout, sample))
         variant = GBufferVariant(gbuffer.planes, gbuffer.layout, plan.cutout, draws.color_varies)
         self._gbuffer_pass(variant).draw(draws, gbuffer)

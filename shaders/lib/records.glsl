@@ -2,7 +2,7 @@
 
 struct View {
     mat4 clip_from_relative;
-    mat4 relative_from_camera;
+    mat4 relative_from_camera; // its offset: the sample's place on the lens
     vec4 window;               // left, right, bottom, top on the plane one unit ahead
     vec2 depth_coefficients;   // camera depth z: 1 / z (perspective) or z (orthographic) = x * stored + y
     vec2 size;                 // pixels
