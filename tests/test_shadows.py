@@ -95,18 +95,13 @@ def test_a_light_that_casts_no_shadow_casts_none(pipeline: Pipeline) -> None:
 
 
 def test_half_opacity_casts_half_a_shadow(pipeline: Pipeline) -> None:
-    """A coin a texel and sample: 64 samples of four texels each leave 0.5/√(64 · ~2) = 4 % of noise."""
+    """A coin a texel and sample, 64 of them under every pixel: 6 % of noise a pixel, far less over the image."""
     thin = Material("/thin", opacity=0.5)
     meshes = [quad(5.0), quad(1.5, 1.0)]
-    lamp = replace(bulb(0, 0, 3), treat_as_point=True)
     placed = [drawable(meshes[0], 0), drawable(meshes[1], 1, 1)]
-    sideways = replace(camera(), world_from_camera=rotated("y", 70.0) @ at(0, 0, 5.0))
-    of = scene(meshes, [lamp], [WHITE, thin], sideways, placed)
-    under = (slice(30, 34), slice(24, 30))
-    ratio = (
-        render(pipeline, of, samples=64)[under].mean() / render(pipeline, of, samples=64, shadows=False)[under].mean()
-    )
-    assert ratio == pytest.approx(0.5, abs=0.05)
+    of = scene(meshes, [replace(bulb(0, 0, 3), treat_as_point=True)], [WHITE, thin], camera(0.9), placed)
+    ratio = render(pipeline, of, samples=64).mean() / render(pipeline, of, samples=64, shadows=False).mean()
+    assert ratio == pytest.approx(0.5, abs=0.01)
 
 
 def irradiance(pipeline: Pipeline, light: Light, samples: int = 256) -> float:
