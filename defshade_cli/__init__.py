@@ -1,8 +1,8 @@
 """defshade: a headless, deferred batch renderer for USD stages.
 
-    from defshade_cli import render
-    film = render("scene.usda", samples=16)
-    film.layers["beauty"]          # (height, width, 4) float32, scene-linear
+from defshade_cli import render
+film = render("scene.usda", samples=16)
+film.layers["beauty"]          # (height, width, 4) float32, scene-linear
 """
 
 from __future__ import annotations

@@ -155,10 +155,6 @@ def test_no_import_circle() -> None:
 
 @pytest.mark.parametrize("folder", ["defshade_cli", "tests"])
 def test_files_stay_short(folder: str) -> None:
-    lengths = {
-        path: len(path.read_text(encoding="utf-8").splitlines()) for path in (ROOT / folder).rglob("*.py")
-    }
-    long = [
-        f"{path.relative_to(ROOT)} has {count} lines" for path, count in lengths.items() if count > MAX_LINES
-    ]
+    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in (ROOT / folder).rglob("*.py")}
+    long = [f"{path.relative_to(ROOT)} has {count} lines" for path, count in lengths.items() if count > MAX_LINES]
     assert not long, f"over {MAX_LINES} lines, time to split: {'; '.join(long)}"

@@ -138,8 +138,9 @@ def test_version() -> None:
         pytest.param(
             2, "out.exr", ["render", "stages/triangle.usda", "--frames", "1:3", "-o", "out.exr"], id="no token"
         ),
-        pytest.param(5, "out.xyz", ["render", "stages/triangle.usda", "-o", "out.xyz"], id="unknown format"),
+        pytest.param(2, ".xyz", ["render", "stages/triangle.usda", "-o", "out.xyz"], id="unknown format"),
         pytest.param(5, "stats.json", ["render", "stages/triangle.usda", "--stats", "no/stats.json"], id="stats"),
+        pytest.param(2, "rsme", ["compare", "a.exr", "b.exr", "--threshold", "rsme=1"], id="unknown metric"),
         pytest.param(5, "missing.exr", ["compare", "missing.exr", "missing.exr"], id="nothing to compare"),
     ],
 )
@@ -302,5 +303,15 @@ def test_compare_ends_with_one_over_the_threshold() -> None:
     different = defshade("compare", "a.exr", "b.exr", "--threshold", "1e-4")
     assert different.returncode == 1
     assert "Traceback" not in different.stderr
+    assert "beauty: rmse" in different.stderr
     record = json.loads(succeed("compare", "a.exr", "b.exr", "--json").stdout)
-    assert record["layers"]["beauty"]["rmse"] > 1e-4
+    assert [layer["layer"] for layer in record["layers"]] == ["beauty"]
+    assert record["layers"][0]["rmse"] > 1e-4
+
+
+def test_compare_writes_the_difference(folder: Path) -> None:
+    succeed("render", "stages/triangle.usda", *SMALL, "--layers", "beauty,depth", "-o", "a.exr", "--quiet")
+    succeed("compare", "a.exr", "a.exr", "--diff", "d.exr", "--threshold", "0")
+    same = json.loads(succeed("compare", "d.exr", "d.exr", "--json").stdout)
+    assert [layer["layer"] for layer in same["layers"]] == ["beauty", "depth"]
+    assert json.loads(succeed("compare", "d.exr", "a.exr", "--json").stdout)["layers"][1]["unmatched"] > 0

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
@@ -12,85 +13,118 @@ from defshade_cli.cli.options import HeadedCommand, epilog
 from defshade_cli.cli.stats import plain
 from defshade_cli.cli.types import Threshold
 from defshade_cli.errors import UsageError
+from defshade_cli.settings import OutputSettings
+
+if TYPE_CHECKING:
+    from defshade_cli.image.compare import Comparison
 
 DIFFERENT = 1
-
-Metrics = dict[str, dict[str, float]]
+METRICS = ("rmse", "rel_mse", "max_error", "flip")
 
 _EPILOG = epilog(
-    "defshade compare before.exr after.exr",
-    "defshade compare before.exr after.exr --threshold 0.001 --diff difference.exr",
-    "defshade compare a.png b.png --threshold max=0.02 --threshold flip=0.05",
-    "defshade compare before.exr after.exr --json",
+    "defshade compare after.exr before.exr",
+    "defshade compare after.exr before.exr --threshold 0.001 --diff difference.exr",
+    "defshade compare after.png before.png --threshold max_error=0.02 --threshold flip=0.05",
+    "defshade compare noisy.exr reference.exr --flip --json",
 )
+
+
+class Excess(NamedTuple):
+    """A layer's metric that is over its threshold."""
+
+    layer: str
+    metric: str
+    value: float
+    threshold: float
 
 
 @click.command(cls=HeadedCommand, epilog=_EPILOG)
-@click.argument("first", metavar="A", type=click.Path(path_type=Path))
-@click.argument("second", metavar="B", type=click.Path(path_type=Path))
+@click.argument("image", metavar="A", type=click.Path(path_type=Path))
+@click.argument("reference", metavar="B", type=click.Path(path_type=Path))
 @click.option(
     "--threshold",
     "thresholds",
-    type=Threshold(),
+    type=Threshold(METRICS),
     metavar="[METRIC=]VALUE",
     multiple=True,
-    help="Most that a metric may be in any layer, repeatable; a bare number is for rmse.",
+    help=f"The most that a metric may be in any layer, repeatable: {', '.join(METRICS)}; a bare number is for rmse.",
 )
-@click.option(
-    "--diff", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE", help="Write the absolute difference."
-)
+@click.option("--flip", is_flag=True, help="Measure FLIP too, the difference as seen: seconds a megapixel.")
+@click.option("--diff", type=click.Path(path_type=Path), metavar="FILE", help="Write the absolute difference.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON in place of a table.")
 @click.pass_context
 def compare(
     context: click.Context,
-    first: Path,
-    second: Path,
+    image: Path,
+    reference: Path,
     thresholds: tuple[tuple[str, float], ...],
+    flip: bool,
     diff: Path | None,
     as_json: bool,
 ) -> None:
     """Compare the layers of images A and B.
 
-    Ends with 1 where a metric of some layer is over its threshold.
+    B is the reference. Ends with 1 where a metric of some layer is over its threshold, or where one image has a NaN
+    or an infinity that the other has not.
     """
     from defshade_cli.image.compare import compare as measure
-    from defshade_cli.image.compare import difference
 
-    layers = measure(first, second)
-    over = _over(layers, thresholds)
+    wants_flip = flip or any(metric == "flip" for metric, _ in thresholds)
+    layers = measure(image, reference, flip=wants_flip)
+    if wants_flip and all(layer.flip is None for layer in layers):
+        raise UsageError("FLIP is of colour layers, and needs the package flip-evaluator")
+    excesses = list(_excesses(layers, thresholds))
     if diff is not None:
-        difference(first, second, diff)
+        _write_difference(image, reference, diff)
     if as_json:
-        click.echo(json.dumps(plain({"layers": layers, "over": over}), indent=2, allow_nan=False))
+        record = {"layers": layers, "over": [excess._asdict() for excess in excesses]}
+        click.echo(json.dumps(plain(record), indent=2, allow_nan=False))
     else:
-        _show(layers, over)
-    context.exit(DIFFERENT if over else 0)
+        _show(layers, excesses)
+    context.exit(DIFFERENT if excesses else 0)
 
 
-def _over(layers: Metrics, thresholds: tuple[tuple[str, float], ...]) -> list[dict[str, Any]]:
-    """Every metric that is over its threshold. NaN is over any; UsageError for a metric that does not exist."""
-    known = {name for metrics in layers.values() for name in metrics}
-    for name, _ in thresholds:
-        if name not in known:
-            raise UsageError(f"no metric named {name!r}; there are {', '.join(sorted(known))}")
-    return [
-        {"layer": layer, "metric": name, "value": metrics[name], "threshold": threshold}
-        for layer, metrics in layers.items()
-        for name, threshold in thresholds
-        if name in metrics and not metrics[name] <= threshold
-    ]
+def _excesses(layers: Sequence[Comparison], thresholds: Sequence[tuple[str, float]]) -> Iterator[Excess]:
+    """What is over its threshold; once there is any threshold, values that are finite in one image alone too."""
+    for layer in layers:
+        if thresholds and layer.unmatched:
+            yield Excess(layer.layer, "unmatched", layer.unmatched, 0)
+        for metric, threshold in thresholds:
+            value = getattr(layer, metric)
+            if value is not None and value > threshold:
+                yield Excess(layer.layer, metric, value, threshold)
 
 
-def _show(layers: Metrics, over: list[dict[str, Any]]) -> None:
+def _write_difference(image: Path, reference: Path, path: Path) -> None:
+    """|A − B| of the layers that both have; the alpha of a difference would hide it, so it is 1."""
+    import numpy as np
+
+    from defshade_cli.image.compare import difference
+    from defshade_cli.image.files import read, write
+    from defshade_cli.image.film import Film
+    from defshade_cli.image.layers import BEAUTY, LAYERS
+    from defshade_cli.scene.camera import Camera
+
+    first, second = read(image), read(reference)
+    layers = {name: difference(first[name], second[name]) for name in LAYERS if name in first and name in second}
+    if BEAUTY in layers:
+        rgb = layers[BEAUTY][..., :3]
+        layers[BEAUTY] = np.concatenate([rgb, np.ones_like(rgb[..., :1])], axis=-1)
+    nowhere = Camera("<difference>", np.eye(4), (-1.0, 1.0, -1.0, 1.0))
+    write(Film(layers, nowhere, path.stem), OutputSettings(full_float=True), path)
+
+
+def _show(layers: Sequence[Comparison], excesses: Sequence[Excess]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    names = list(dict.fromkeys(name for metrics in layers.values() for name in metrics))
+    metrics = [name for name in (*METRICS, "psnr", "unmatched") if any(getattr(c, name) is not None for c in layers)]
     table = Table("layer", box=None)
-    for name in names:
-        table.add_column(name, justify="right")
-    for layer, metrics in layers.items():
-        table.add_row(layer, *(f"{metrics[name]:.6g}" if name in metrics else "" for name in names))
+    for metric in metrics:
+        table.add_column(metric, justify="right")
+    for layer in layers:
+        values = (getattr(layer, metric) for metric in metrics)
+        table.add_row(layer.layer, *("" if value is None else f"{value:.6g}" for value in values))
     Console(markup=False, highlight=False).print(table)
-    for entry in over:
-        click.echo(f"{entry['layer']}: {entry['metric']} {entry['value']:.6g} is over {entry['threshold']:g}", err=True)
+    for excess in excesses:
+        click.echo(f"{excess.layer}: {excess.metric} {excess.value:.6g} is over {excess.threshold:g}", err=True)

@@ -232,7 +232,7 @@ def _output_options(name: str) -> list[Function]:
             "--float",
             "full_float",
             is_flag=True,
-            help="32-bit channels for colours in EXR too, as data layers always have.",
+            help="32-bit channels in EXR for light and reflectance too; all else is 32-bit always.",
         ),
         option(
             "--compression",

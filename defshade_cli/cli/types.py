@@ -70,19 +70,25 @@ class Names(click.ParamType):
         names = [name.strip() for name in value.split(",")]
         for name in names:
             if name not in self.choices:
-                self.fail(f"unknown {self.noun} {name!r}; {self._suggestion(name)}", param, ctx)
+                self.fail(f"unknown {self.noun} {name!r}; {_suggestion(name, self.choices)}", param, ctx)
         return tuple(dict.fromkeys(names))
-
-    def _suggestion(self, name: str) -> str:
-        close = difflib.get_close_matches(name, self.choices, 1)
-        return f"did you mean {close[0]!r}?" if close else f"known are {', '.join(self.choices)}"
 
 
 class Threshold(click.ParamType):
-    """`rmse=0.001`, or `0.001` for the same → ("rmse", 0.001)."""
+    """`flip=0.05` → ("flip", 0.05); a bare number is for the first of `metrics`."""
 
-    name = "[METRIC=]VALUE"
+    name = "threshold"
+
+    def __init__(self, metrics: Sequence[str]) -> None:
+        self.metrics = tuple(metrics)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, float]:
         metric, _, number = value.rpartition("=")
-        return metric or "rmse", Finite().convert(number, param, ctx)
+        if metric not in ("", *self.metrics):
+            self.fail(f"unknown metric {metric!r}; {_suggestion(metric, self.metrics)}", param, ctx)
+        return metric or self.metrics[0], Finite().convert(number, param, ctx)
+
+
+def _suggestion(name: str, choices: Sequence[str]) -> str:
+    close = difflib.get_close_matches(name, choices, 1)
+    return f"did you mean {close[0]!r}?" if close else f"known are {', '.join(choices)}"

@@ -74,10 +74,13 @@ def compare(a: Image, b: Image, layers: Iterable[str] | None = None, *, flip: bo
 
 def difference(a: NDArray, b: NDArray) -> Pixels:
     """|a − b| (H, W, C); 0 where both hold the same infinity or NaN, inf where one alone does."""
+    a, b = np.asarray(a, np.float32), np.asarray(b, np.float32)
     with np.errstate(invalid="ignore"):
-        apart = np.abs(np.asarray(a, np.float32) - np.asarray(b, np.float32))
-    same = (a == b) | (np.isnan(a) & np.isnan(b))
-    return np.where(same, np.float32(0), np.where(np.isfinite(apart), apart, np.float32(inf)))
+        apart = np.abs(a - b)
+    odd = ~np.isfinite(apart)
+    same = (a[odd] == b[odd]) | (np.isnan(a[odd]) & np.isnan(b[odd]))
+    apart[odd] = np.where(same, 0.0, inf)
+    return apart
 
 
 def _layers_of(image: Image) -> Mapping[str, NDArray]:

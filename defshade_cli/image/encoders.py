@@ -23,6 +23,9 @@ EXR = ".exr"
 _BAND = 128
 """Rows interleaved at a time: a few blocks of every EXR compression, and no second copy of a large film."""
 
+_DWA_LOSSY = {"R", "G", "B", "Y"}
+"""Channel names that DWA compression blurs, 32-bit ones too: OpenEXR, ImfDwaCompressor.cpp, the channel rules."""
+
 log = logging.getLogger("defshade")
 
 
@@ -41,7 +44,9 @@ class _PictureFormat:
 
 
 _JPEG = _PictureFormat(alpha=False, hints=(("compression", "jpeg:95"), ("jpeg:subsampling", "4:4:4")), fails_badly=True)
-_TIFF = _PictureFormat("uint16", hints=(("compression", "zip"),))
+_TIFF = _PictureFormat("uint16", hints=(("compression", "zip"), ("Exif:ColorSpace", 65535)))
+"""Uncalibrated, unless the display is sRGB: an Exif block without any entry is reported as a failure."""
+
 _PICTURES = {
     ".png": _PictureFormat(hints=(("png:compressionLevel", 1),)),
     ".jpg": _JPEG,
@@ -51,7 +56,7 @@ _PICTURES = {
     ".webp": _PictureFormat(hints=(("compression", "lossless"),), fails_badly=True),
     ".tga": _PictureFormat(),
     ".bmp": _PictureFormat(alpha=False),
-    ".ppm": _PictureFormat(alpha=False),
+    ".ppm": _PictureFormat(alpha=False, hints=(("pnm:pfmflip", 0),)),  # else OpenImageIO writes it upside down
 }
 SUFFIXES = (EXR, *_PICTURES)
 
@@ -83,7 +88,7 @@ def _write_exr(film: Film, names: tuple[str, ...], output: OutputSettings, path:
             bottom = min(top + _BAND, spec.height)
             rows = [plane[top:bottom] for plane in planes]
             band = np.concatenate(rows, axis=-1, dtype=band_type, casting="same_kind")
-            encoder.write_scanlines(top, bottom, 0, band)
+            encoder.write_scanlines(top, bottom, 0, np.ascontiguousarray(band))
 
 
 def _exr_spec(film: Film, names: tuple[str, ...], halves: set[str], compression: str) -> oiio.ImageSpec:
@@ -94,9 +99,17 @@ def _exr_spec(film: Film, names: tuple[str, ...], halves: set[str], compression:
     if len(set(types)) > 1:
         spec.channelformats = tuple(oiio.TypeDesc(kind) for kind in types)
     spec.set_colorspace(RENDER_SPACE if any(LAYERS[name].is_color for name in names) else "data")
-    spec.attribute("compression", compression)
+    spec.attribute("compression", _lossless_for_data(compression, names))
     _set(spec, exr_attributes(film, names))
     return spec
+
+
+def _lossless_for_data(compression: str, names: tuple[str, ...]) -> str:
+    data = [name for name in names if not LAYERS[name].is_color and _DWA_LOSSY & set(LAYERS[name].channels)]
+    if compression != "dwaa" or not data:
+        return compression
+    log.warning("dwaa would blur the data in %s: this file is compressed with zip", ", ".join(data))
+    return "zip"
 
 
 def _write_picture(film: Film, name: str, output: OutputSettings, path: Path) -> None:
@@ -113,7 +126,7 @@ def _write_picture(film: Film, name: str, output: OutputSettings, path: Path) ->
     if form.fails_badly:
         _claim(path, spec.image_bytes())
     with _encoder(path, spec) as encoder:
-        encoder.write_image(shown)
+        encoder.write_image(np.ascontiguousarray(shown))
 
 
 def _bounded(name: str, pixels: Pixels, limit: float | None) -> Pixels:

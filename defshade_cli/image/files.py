@@ -76,7 +76,7 @@ def read(path: Path) -> dict[str, Pixels]:
     layers: dict[str, Pixels] = {}
     for spec, pixels in _parts(path):
         for name, channels in _grouped(spec).items():
-            layers.setdefault(name, np.ascontiguousarray(pixels[..., channels]))
+            layers.setdefault(name, np.take(pixels, channels, axis=-1))
     return layers
 
 
@@ -91,12 +91,13 @@ def _appearing_at(path: Path) -> Iterator[Path]:
     hidden = path.with_name(f".{os.getpid()}-{threading.get_ident():x}{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        yield hidden
-        hidden.replace(path)
+        try:
+            yield hidden
+            hidden.replace(path)
+        finally:
+            hidden.unlink(missing_ok=True)
     except OSError as error:
         raise OutputError(f"{path}: {_reason(error)}") from error
-    finally:
-        hidden.unlink(missing_ok=True)
 
 
 def _reason(error: OSError) -> str:

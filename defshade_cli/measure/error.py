@@ -32,7 +32,7 @@ def relative_error(image: NDArray, reference: NDArray, *, floor: float = 1e-3) -
     errors = relative_differences(image, reference, floor=floor)
     if not len(errors):
         return RelativeError(0.0, 0.0, 0.0, 0.0, 0)
-    median, p99, p999 = np.percentile(errors, [50.0, 99.0, 99.9])
+    median, p99, p999 = np.percentile(errors, [50.0, 99.0, 99.9], method="higher")
     return RelativeError(float(median), float(p99), float(p999), float(errors.max()), len(errors))
 
 

@@ -47,9 +47,7 @@ def shade(surface: Surface, lights: Iterable[Light], *, shading: Shading = "prev
     radiance = surface.emission.copy()
     for light in lights:
         direction, irradiance = irradiance_at(light, surface.position)
-        radiance += irradiance * evaluate_brdf(
-            surface, direction, (light.diffuse, light.specular), shading=shading
-        )
+        radiance += irradiance * evaluate_brdf(surface, direction, (light.diffuse, light.specular), shading=shading)
     return radiance
 
 

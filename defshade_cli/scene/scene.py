@@ -64,7 +64,7 @@ class Scene:
         if not np.isfinite(box).all():
             return np.empty((0, 3))
         linear, offset = drawable.world_from_object[:, :3, :3], drawable.world_from_object[:, None, :3, 3]
-        return (np.einsum("nij,kj->nki", linear, box) + offset).reshape(-1, 3)
+        return (box @ linear.transpose(0, 2, 1) + offset).reshape(-1, 3)
 
     @cached_property
     def triangle_count(self) -> int:

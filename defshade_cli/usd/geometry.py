@@ -1,28 +1,29 @@
-"""Any surface prim of a stage as one triangulated scene.Mesh."""
+"""Any surface prim of a stage as one triangulated scene.Mesh.
+
+prim ── mesh | gprims ──→ Polygons ── normals ──→ Polygons ── triangulation ──→ Mesh ── subsets ──→ Gprim
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd
+from pxr import Usd, UsdGeom
 
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.scene.scene import Unsupported
+from defshade_cli.usd import mesh as meshes
+from defshade_cli.usd.gprims import read_solid, size_attributes
+from defshade_cli.usd.mesh import read_mesh
+from defshade_cli.usd.normals import with_normals
+from defshade_cli.usd.polygons import Polygons, Primvar
+from defshade_cli.usd.primvars import find_display
+from defshade_cli.usd.subsets import FaceGroup, group_faces, material_subsets
+from defshade_cli.usd.triangulation import triangulate
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FaceGroup:
-    """A run of triangles that share a material binding.
-
-    path: prim path of the GeomSubset, or of the gprim for the faces that no subset holds.
-    first, count: triangles.
-    """
-
-    path: str
-    first: int
-    count: int
+__all__ = ["FaceGroup", "Gprim", "is_time_varying", "read_gprim"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,8 +32,8 @@ class Gprim:
 
     mesh: triangles sorted so that each group is one run.
     groups: cover every triangle, in order; none is empty.
-    display_color: (3,) float32, the constant authored or inherited value; None where there is none or where it
-        varies, and mesh.display_color has it. display_opacity likewise.
+    display_color: (3,) float32, the constant authored or inherited value; None where there is none, or where it
+        varies and mesh.display_color has it. display_opacity likewise.
     issues: what was left out or mended of this prim, and why.
     """
 
@@ -44,13 +45,70 @@ class Gprim:
 
 
 def read_gprim(prim: Usd.Prim, time: Usd.TimeCode) -> Gprim | None:
-    """The surface of `prim`; None for a type that is no supported surface. Bad data ends in issues, never raises.
+    """The surface of `prim`; None for a type that is no supported surface. Bad data becomes issues, never raises.
 
     A surface of which nothing can be drawn has a mesh without triangles, no groups, and issues that say why.
     """
-    raise NotImplementedError
+    issues: list[str] = []
+    polygons = _read_polygons(prim, time, issues)
+    if polygons is None:
+        return None
+    polygons = with_normals(polygons).without_holes()
+    mesh = _to_mesh(prim, polygons, issues)
+    mesh, groups = group_faces(mesh, prim, time, issues)
+    color, opacity = _constant(polygons.display_color), _constant(polygons.display_opacity)
+    return Gprim(
+        mesh=mesh,
+        groups=groups,
+        display_color=color,
+        display_opacity=None if opacity is None else float(opacity),
+        issues=tuple(Unsupported(mesh.path, issue) for issue in issues),
+    )
 
 
 def is_time_varying(prim: Usd.Prim) -> bool:
     """Does anything that read_gprim reads, primvars inherited and face subsets included, differ over time?"""
-    raise NotImplementedError
+    names = meshes.ATTRIBUTES if prim.IsA(UsdGeom.Mesh) else size_attributes(prim)
+    primvars = (
+        UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals"),
+        find_display(prim, "displayColor"),
+        find_display(prim, "displayOpacity"),
+    )
+    subsets = (subset.GetIndicesAttr() for subset in material_subsets(prim))
+    sources = (*(prim.GetAttribute(name) for name in names), *primvars, *subsets)
+    return any(source.ValueMightBeTimeVarying() for source in sources if source)
+
+
+def _read_polygons(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> Polygons | None:
+    if prim.IsA(UsdGeom.Mesh):
+        return read_mesh(UsdGeom.Mesh(prim), time, issues)
+    return read_solid(prim, time, issues)
+
+
+def _to_mesh(prim: Usd.Prim, polygons: Polygons, issues: list[str]) -> Mesh:
+    """Triangles over the points, or over the corners where something on the mesh splits points."""
+    corners, face = triangulate(polygons, issues)
+    if polygons.left_handed:
+        corners = corners[:, ::-1]
+    normals, color, opacity = polygons.normals, polygons.display_color, polygons.display_opacity
+    assert normals is not None
+    split = any(primvar.splits_points for primvar in (normals, color, opacity) if primvar is not None)
+    place = polygons.at_corners if split else polygons.at_points
+    return Mesh(
+        path=str(prim.GetPath()),
+        points=polygons.points[polygons.indices] if split else polygons.points,
+        normals=place(normals),
+        triangles=(corners if split else polygons.indices[corners]).astype(np.uint32),
+        faces=polygons.faces[face],
+        display_color=place(color) if _varies(color) else None,
+        display_opacity=place(opacity) if _varies(opacity) else None,
+        double_sided=bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get()),
+    )
+
+
+def _varies(primvar: Primvar | None) -> TypeGuard[Primvar]:
+    return primvar is not None and primvar.interpolation != "constant"
+
+
+def _constant(primvar: Primvar | None) -> NDArray[np.float32] | None:
+    return None if primvar is None or _varies(primvar) else primvar.values[0]

@@ -1,0 +1,82 @@
+"""What each GBuffer layout costs: the beauty of stages against the float64 reference, as a table for the docs.
+
+`python -m defshade_cli.measure.layouts docs/lighting.md` renders every stage in scenes/ and writes the table anew.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from defshade_cli import resources
+from defshade_cli.gpu.context import Gpu
+from defshade_cli.measure.error import RelativeError, relative_error
+from defshade_cli.measure.reference import reference_radiance
+from defshade_cli.passes.pipeline import Pipeline
+from defshade_cli.plan import make_plan
+from defshade_cli.scene.scene import Scene
+from defshade_cli.settings import LAYOUTS, Layout, RenderSettings
+from defshade_cli.usd.reader import StageReader
+from defshade_cli.usd.stage import open_stage
+
+SIZE = (480, 270)
+_HEADER = "| stage | " + " | ".join(f"{layout} | p99.9" for layout in LAYOUTS) + " |"
+_RULE = "|---|" + "---:|---:|" * len(LAYOUTS)
+
+
+def first_frame(path: Path) -> Scene:
+    """The stage at its first frame, seen by its own camera."""
+    reader = StageReader(open_stage(path))
+    return reader.read(reader.first_frame())
+
+
+def layout_errors(
+    pipeline: Pipeline, scene: Scene, settings: RenderSettings, layouts: Iterable[Layout] = LAYOUTS
+) -> dict[Layout, RelativeError]:
+    """Each layout's beauty against the reference, which is evaluated on the float GBuffer."""
+    plan = make_plan(scene, replace(settings, layout="float"))
+    reference, _ = reference_radiance(
+        pipeline.planes(scene, plan), plan.camera, scene.lights, shading=settings.shading, exposure=settings.exposure
+    )
+
+    def error(layout: Layout) -> RelativeError:
+        film = pipeline.render(scene, make_plan(scene, replace(settings, layout=layout)))
+        return relative_error(film.layers["beauty"][..., :3], reference)
+
+    return {layout: error(layout) for layout in layouts}
+
+
+def layout_table(errors: Mapping[str, Mapping[Layout, RelativeError]]) -> str:
+    """Markdown: one row a stage, median and 99.9th percentile a layout."""
+    rows = [
+        f"| {stage} | " + " | ".join(f"{e.median:.1e} | {e.p999:.1e}" for e in (by_layout[x] for x in LAYOUTS)) + " |"
+        for stage, by_layout in errors.items()
+    ]
+    return "\n".join([_HEADER, _RULE, *rows])
+
+
+def replace_generated(page: str, name: str, content: str) -> str:
+    """`page` with what stands between `<!-- generated: name -->` and `<!-- end generated -->` replaced.
+
+    Raises ValueError where the page has no such section.
+    """
+    section = re.compile(rf"(<!-- generated: {re.escape(name)} -->\n).*?(<!-- end generated -->)", re.DOTALL)
+    if not section.search(page):
+        raise ValueError(f"no section generated: {name}")
+    return section.sub(lambda match: f"{match[1]}{content}\n{match[2]}", page)
+
+
+def main(page: Path) -> None:
+    stages = sorted(resources.SCENES.glob("*.usda"))
+    with Gpu() as gpu:
+        pipeline = Pipeline(gpu)
+        settings = RenderSettings(size=SIZE)
+        errors = {path.stem: layout_errors(pipeline, first_frame(path), settings) for path in stages}
+    page.write_text(replace_generated(page.read_text("utf-8"), "layouts", layout_table(errors)), "utf-8")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,63 @@
+"""Which material is bound to a prim, for each purpose.
+
+USD resolves what is authored on a prim and above it (UsdShadeMaterialBindingAPI: strengths, collections, subsets).
+Inside a prototype it sees nothing above the prototype's root, so bindings are kept per purpose and laid under those
+of the instance by the same rule: the nearest wins, unless one from above is stronger than its descendants.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from pxr import Sdf, Usd, UsdShade
+
+
+class Binding(NamedTuple):
+    """material: its path, whether or not it exists; stronger: than what is bound further down."""
+
+    material: Sdf.Path
+    stronger: bool
+
+
+class Bindings(NamedTuple):
+    """The bindings of a prim by purpose, in order of preference."""
+
+    full: Binding | None = None
+    preview: Binding | None = None
+    all_purpose: Binding | None = None
+
+    def under(self, above: Bindings) -> Bindings:
+        """These as they resolve below a prim that has `above`."""
+        return Bindings(*(_stronger(here, there) for here, there in zip(self, above, strict=True)))
+
+    @property
+    def candidates(self) -> tuple[Sdf.Path, ...]:
+        """Material paths, the preferred first."""
+        return tuple(binding.material for binding in self if binding)
+
+
+NOTHING_BOUND = Bindings()
+
+
+def read_bindings(prim: Usd.Prim) -> Bindings:
+    """What is bound to `prim`, a gprim, a subset or an instance, by its own stage hierarchy."""
+    api = UsdShade.MaterialBindingAPI(prim)
+    _, everywhere = api.ComputeBoundMaterial()
+    full, preview = (
+        _binding(relationship) if relationship != everywhere else None
+        for purpose in (UsdShade.Tokens.full, UsdShade.Tokens.preview)
+        for _, relationship in [api.ComputeBoundMaterial(purpose)]
+    )
+    return Bindings(full, preview, _binding(everywhere))
+
+
+def _binding(relationship: Usd.Relationship) -> Binding | None:
+    """The relationship of a collection targets the collection too, which is a property."""
+    targets = relationship.GetForwardedTargets() if relationship else ()
+    material = next((target for target in targets if target.IsPrimPath()), None)
+    strength = UsdShade.MaterialBindingAPI.GetMaterialBindingStrength(relationship) if material else None
+    return Binding(material, strength == UsdShade.Tokens.strongerThanDescendants) if material else None
+
+
+def _stronger(here: Binding | None, there: Binding | None) -> Binding | None:
+    return there if here is None or (there is not None and there.stronger) else here

@@ -1,0 +1,54 @@
+"""What a prim's type means to a renderer."""
+
+from __future__ import annotations
+
+from enum import Enum, auto
+
+from pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdSkel
+
+
+class Kind(Enum):
+    """GROUP: only what stands below counts.  SHADING: nothing that can be drawn stands below.
+
+    UNDRAWN: takes room on the stage, but is no surface.  UNKNOWN: a type that no installed schema defines.
+    """
+
+    GROUP = auto()
+    GPRIM = auto()
+    POINT_INSTANCER = auto()
+    SHADING = auto()
+    UNDRAWN = auto()
+    UNKNOWN = auto()
+
+
+_KINDS = (
+    (UsdGeom.PointInstancer, Kind.POINT_INSTANCER),
+    (UsdGeom.Gprim, Kind.GPRIM),
+    (UsdLux.BoundableLightBase, Kind.GROUP),
+    (UsdSkel.Root, Kind.GROUP),
+    (UsdSkel.Skeleton, Kind.GROUP),
+    (UsdGeom.Boundable, Kind.UNDRAWN),
+    (UsdGeom.Subset, Kind.SHADING),
+    (UsdShade.NodeGraph, Kind.SHADING),
+    (UsdShade.Shader, Kind.SHADING),
+)
+"""The first schema that a prim is of decides."""
+
+
+class Kinds:
+    """Prims by kind; the answer is the same for all of a type, and kept."""
+
+    def __init__(self) -> None:
+        self._of_type: dict[str, Kind] = {}
+
+    def of(self, prim: Usd.Prim) -> Kind:
+        type_name = prim.GetTypeName()
+        if type_name not in self._of_type:
+            self._of_type[type_name] = _classify(prim)
+        return self._of_type[type_name]
+
+
+def _classify(prim: Usd.Prim) -> Kind:
+    if prim.GetTypeName() and not prim.GetPrimTypeInfo().GetSchemaTypeName():
+        return Kind.UNKNOWN
+    return next((kind for schema, kind in _KINDS if prim.IsA(schema)), Kind.GROUP)

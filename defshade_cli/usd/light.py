@@ -1,0 +1,107 @@
+"""UsdLux lights in scene terms.
+
+What the scene cannot say yet (domes, lights made of geometry, portals, plug-in lights, IES profiles, textures,
+filters, linking, connected inputs) is reported; a light that has some of these is read without them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdLux
+
+from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.light import CylinderLight, DiskLight, DistantLight, Light, RectLight, Shaping, SphereLight
+from defshade_cli.scene.scene import Unsupported
+
+CAMERA_LIGHT = "<camera light>"
+"""Path of the light of a stage that has none."""
+
+_CLASSES: tuple[tuple[Any, type[Light], tuple[str, ...]], ...] = (
+    (UsdLux.DistantLight, DistantLight, ("angle",)),
+    (UsdLux.SphereLight, SphereLight, ("radius",)),
+    (UsdLux.DiskLight, DiskLight, ("radius",)),
+    (UsdLux.RectLight, RectLight, ("width", "height")),
+    (UsdLux.CylinderLight, CylinderLight, ("radius", "length")),
+)
+"""Schema, scene class, and the inputs that say its size."""
+
+_WHITE = np.array(UsdLux.BlackbodyTemperatureAsRgb(6500.0))
+
+
+def is_light(prim: Usd.Prim) -> bool:
+    return prim.HasAPI(UsdLux.LightAPI)
+
+
+def read_light(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Light | None, tuple[Unsupported, ...]]:
+    """The light at `time` in its own space (world_from_light is the identity), and what of it is left out.
+
+    None for a kind that is not supported. Purposes do not concern lights, as in Hydra.
+    """
+    path = str(prim.GetPath())
+    for schema, light_class, sizes in _CLASSES:
+        if prim.IsA(schema):
+            fields = {size: _input(prim, size, time) for size in sizes}
+            if light_class is SphereLight:
+                fields["treat_as_point"] = bool(UsdLux.SphereLight(prim).GetTreatAsPointAttr().Get(time))
+            light = light_class(path=path, world_from_light=np.eye(4), **_common(prim, time), **fields)
+            return light, tuple(Unsupported(path, reason) for reason in _left_out(prim, time))
+    return None, (Unsupported(path, f"lights of type {prim.GetTypeName()} are not supported yet"),)
+
+
+def camera_light(camera: Camera) -> DistantLight:
+    """A light of irradiance π along the camera's view: a white Lambertian surface that faces the camera reads 1."""
+    return DistantLight(
+        path=CAMERA_LIGHT, world_from_light=camera.world_from_camera, color=np.ones(3), intensity=math.pi, angle=0.0
+    )
+
+
+def temperature_color(kelvin: float) -> NDArray[np.float64]:
+    """(3,) linear Rec. 709, white at 6500 K as LightAPI's inputs:colorTemperature asks."""
+    return np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin)) / _WHITE
+
+
+def _common(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any]:
+    color = np.array(_input(prim, "color", time), np.float64)
+    if _input(prim, "enableColorTemperature", time):
+        color = color * temperature_color(_input(prim, "colorTemperature", time))
+    names = ("intensity", "exposure", "normalize", "diffuse", "specular")
+    shaping = _shaping(prim, time) if prim.HasAPI(UsdLux.ShapingAPI) else None
+    return {"color": color, "shaping": shaping} | {name: _input(prim, name, time) for name in names}
+
+
+def _shaping(prim: Usd.Prim, time: Usd.TimeCode) -> Shaping:
+    profile = _input(prim, "shaping:ies:file", time)
+    return Shaping(
+        focus=max(_input(prim, "shaping:focus", time), 0.0),
+        focus_tint=tuple(_input(prim, "shaping:focusTint", time)),
+        cone_angle=_input(prim, "shaping:cone:angle", time),
+        cone_softness=min(max(_input(prim, "shaping:cone:softness", time), 0.0), 1.0),
+        ies_file=(profile.path or None) if profile else None,
+    )
+
+
+def _left_out(prim: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
+    api = UsdLux.LightAPI(prim)
+    for link in (api.GetLightLinkCollectionAPI(), api.GetShadowLinkCollectionAPI()):
+        if not link.GetIncludeRootAttr().Get() or link.GetExcludesRel().HasAuthoredTargets():
+            yield f"{link.GetName()} is ignored: everything is linked"
+    if api.GetFiltersRel().GetForwardedTargets():
+        yield "light filters are ignored"
+    for name in ("texture:file", "shaping:ies:file"):
+        file = _input(prim, name, time)
+        if file and file.path:
+            yield f"inputs:{name} is ignored"
+    connected = [attr.GetName() for attr in prim.GetAuthoredAttributes() if attr.HasAuthoredConnections()]
+    if connected:
+        yield f"connections are ignored: {', '.join(connected)}"
+
+
+def _input(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Any:
+    """Value of `inputs:name`, the schema's fallback included; None where the schema has no such input."""
+    attribute = prim.GetAttribute(f"inputs:{name}")
+    return attribute.Get(time) if attribute else None

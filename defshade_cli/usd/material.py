@@ -1,0 +1,144 @@
+"""UsdShade materials as scene.Material.
+
+Read are UsdPreviewSurface nodes with constant inputs, also through the interfaces of materials and node graphs, and
+readers of displayColor. Any other source of an input is named in the report: the input then takes the fallback that
+is authored on the node in its place, or the schema's default.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from pxr import Sdf, Usd, UsdShade
+
+from defshade_cli.scene.material import UNBOUND, Material
+from defshade_cli.scene.scene import Unsupported
+
+_FIELDS = {
+    "diffuseColor": "diffuse_color",
+    "emissiveColor": "emissive_color",
+    "useSpecularWorkflow": "use_specular_workflow",
+    "specularColor": "specular_color",
+    "metallic": "metallic",
+    "roughness": "roughness",
+    "clearcoat": "clearcoat",
+    "clearcoatRoughness": "clearcoat_roughness",
+    "opacity": "opacity",
+    "opacityThreshold": "opacity_threshold",
+    "opacityMode": "opacity_mode",
+    "ior": "ior",
+}
+"""UsdPreviewSurface inputs and the fields they fill. normal, displacement and occlusion have none."""
+
+_DEFAULTS = {f.name: f.default for f in fields(Material)}
+_CHANNELS = {"r": slice(0, 1), "g": slice(1, 2), "b": slice(2, 3), "a": slice(3, 4)}
+_READER = "UsdPrimvarReader_"
+
+
+@dataclass(frozen=True, slots=True)
+class ReadMaterial:
+    """understood: its surface is a UsdPreviewSurface. time_varying: some value that was read differs over time."""
+
+    material: Material
+    understood: bool = True
+    time_varying: bool = False
+    issues: tuple[Unsupported, ...] = ()
+
+
+@dataclass(slots=True)
+class _Inputs:
+    """What reading a node's inputs gathers."""
+
+    values: dict[str, Any] = field(default_factory=dict)
+    left_out: list[str] = field(default_factory=list)
+    time_varying: bool = False
+
+
+def read_material(stage: Usd.Stage, path: Sdf.Path, shown_as: str, time: Usd.TimeCode) -> ReadMaterial:
+    """The material at `path`, reported as `shown_as`; one that is not understood is drawn like an unbound one."""
+    material = UsdShade.Material(stage.GetPrimAtPath(path))
+    if not material:
+        return _not_understood(shown_as, "the bound material does not exist")
+    shader, _, _ = material.ComputeSurfaceSource()
+    identifier = shader.GetShaderId() if shader else None
+    if identifier != "UsdPreviewSurface":
+        return _not_understood(shown_as, _surface_named(material, shader, identifier))
+    inputs = _read_inputs(shader, time)
+    reason = f"not read: {', '.join(inputs.left_out)}"
+    return ReadMaterial(
+        Material(shown_as, **inputs.values),
+        time_varying=inputs.time_varying,
+        issues=(Unsupported(shown_as, reason),) if inputs.left_out else (),
+    )
+
+
+def _not_understood(path: str, reason: str) -> ReadMaterial:
+    material = Material(path, uses_display_color=UNBOUND.uses_display_color)
+    return ReadMaterial(material, understood=False, issues=(Unsupported(path, reason),))
+
+
+def _surface_named(material: UsdShade.Material, shader: UsdShade.Shader, identifier: str | None) -> str:
+    if shader:
+        return f"surface {identifier or 'shader of source code'} is not UsdPreviewSurface"
+    contexts = [output.GetBaseName() for output in material.GetSurfaceOutputs() if output.HasConnectedSource()]
+    return f"no UsdPreviewSurface, only {', '.join(contexts)}" if contexts else "no surface"
+
+
+def _read_inputs(shader: UsdShade.Shader, time: Usd.TimeCode) -> _Inputs:
+    inputs = _Inputs()
+    for authored in shader.GetInputs():
+        name = authored.GetBaseName()
+        sources = authored.GetValueProducingAttributes()
+        if not sources:
+            continue
+        if sources[0].GetName().startswith(UsdShade.Tokens.inputs):
+            _take(inputs, name, sources[0].Get(time))
+            inputs.time_varying |= sources[0].ValueMightBeTimeVarying()
+        else:
+            _take_from_node(inputs, name, sources[0], time)
+    return inputs
+
+
+def _take(inputs: _Inputs, name: str, value: Any) -> None:
+    if name not in _FIELDS or value is None:
+        return
+    try:
+        inputs.values[_FIELDS[name]] = _as_field(value, _DEFAULTS[_FIELDS[name]])
+    except (TypeError, ValueError):
+        inputs.left_out.append(f"{name} ({type(value).__name__})")
+
+
+def _take_from_node(inputs: _Inputs, name: str, output: Usd.Attribute, time: Usd.TimeCode) -> None:
+    """A value that a shader computes: displayColor is understood, of all others the authored fallback is taken."""
+    node = UsdShade.Shader(output.GetPrim())
+    identifier = str(node.GetShaderId() or "a node without id")
+    varname = _constant(node, "varname", time) if identifier.startswith(_READER) else None
+    if name == "diffuseColor" and varname == "displayColor":
+        inputs.values["uses_display_color"] = True
+        return
+    _take(inputs, name, _fallback(node, output.GetBaseName(), time))
+    if not (name == "opacity" and varname == "displayOpacity"):
+        inputs.left_out.append(f"{name} (primvar {varname})" if varname else f"{name} ({identifier})")
+
+
+def _fallback(node: UsdShade.Shader, channel: str, time: Usd.TimeCode) -> Any:
+    """The fallback authored on a texture or primvar reader, as the channel that is connected; else None."""
+    value = _constant(node, "fallback", time)
+    return value if value is None or channel not in _CHANNELS else np.asarray(value)[_CHANNELS[channel]]
+
+
+def _constant(node: UsdShade.Shader, name: str, time: Usd.TimeCode) -> Any:
+    sources = node.GetInput(name).GetValueProducingAttributes() if node.GetInput(name) else ()
+    return sources[0].Get(time) if sources else None
+
+
+def _as_field(value: Any, default: Any) -> Any:
+    """`value` as the type of the field's default; a scalar fills a colour, a colour beyond three channels is cut."""
+    if isinstance(default, tuple):
+        channels = np.ravel(np.asarray(value, np.float64))
+        return tuple(np.broadcast_to(channels[:3], 3).tolist())
+    if isinstance(default, float):
+        return float(np.ravel(value)[0])
+    return type(default)(value)

@@ -1,0 +1,66 @@
+"""What stays the same from frame to frame, read once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pxr import Sdf, Usd, UsdGeom
+
+from defshade_cli.usd.binding import Bindings, read_bindings
+from defshade_cli.usd.geometry import Gprim, is_time_varying, read_gprim
+from defshade_cli.usd.kind import Kinds
+from defshade_cli.usd.material import ReadMaterial, read_material
+
+
+class Memory:
+    """The unchanging parts of one stage, and the names of what stands in its prototypes.
+
+    kinds: of prims.  xforms: USD's cache, which drops only what varies when its time is set.
+    """
+
+    def __init__(self, stage: Usd.Stage) -> None:
+        self.kinds = Kinds()
+        self.xforms = UsdGeom.XformCache()
+        self._stage = stage
+        self._gprims: dict[Sdf.Path, Gprim | None] = {}
+        self._bindings: dict[Sdf.Path, Bindings] = {}
+        self._materials: dict[Sdf.Path, ReadMaterial] = {}
+        self._first_instances: dict[str, str] = {}
+
+    def gprim(self, prim: Usd.Prim, time: Usd.TimeCode) -> Gprim | None:
+        """The same object at every time, unless something of the prim varies."""
+        path = prim.GetPath()
+        if path in self._gprims:
+            return self._gprims[path]
+        gprim = read_gprim(prim, time)
+        if gprim is not None:
+            mesh = replace(gprim.mesh, path=self.shown(path))
+            issues = tuple(replace(issue, path=self.shown(issue.path)) for issue in gprim.issues)
+            gprim = replace(gprim, mesh=mesh, issues=issues)
+        if gprim is None or not is_time_varying(prim):
+            self._gprims[path] = gprim
+        return gprim
+
+    def material(self, path: Sdf.Path, time: Usd.TimeCode) -> ReadMaterial:
+        if path in self._materials:
+            return self._materials[path]
+        read = read_material(self._stage, path, self.shown(path), time)
+        if not read.time_varying:
+            self._materials[path] = read
+        return read
+
+    def bindings(self, path: Sdf.Path | str) -> Bindings:
+        """Relationships do not vary over time."""
+        path = Sdf.Path(path)
+        if path not in self._bindings:
+            self._bindings[path] = read_bindings(self._stage.GetPrimAtPath(path))
+        return self._bindings[path]
+
+    def shown(self, path: Sdf.Path | str) -> str:
+        """The path by which users know a prim: for one inside a native prototype, its path in the first instance."""
+        root, slash, below = str(path)[1:].partition("/")
+        return self._first_instances.get(root, f"/{root}") + slash + below
+
+    def name_prototype(self, prototype: Usd.Prim, instance: Usd.Prim) -> str:
+        """Show what stands in `prototype` as part of `instance`, or of the instance that came first."""
+        return self._first_instances.setdefault(prototype.GetName(), self.shown(instance.GetPath()))

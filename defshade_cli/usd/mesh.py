@@ -1,0 +1,120 @@
+"""UsdGeom.Mesh → Polygons. What contradicts itself is dropped, and said."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+from defshade_cli.usd.normals import mend_normals
+from defshade_cli.usd.polygons import SCHEMES, Polygons, Primvar, Scheme
+from defshade_cli.usd.primvars import Authored, Elements, authored, count_elements, fit, read_display
+from defshade_cli.usd.values import floats, integers
+
+ATTRIBUTES = ("points", "faceVertexCounts", "faceVertexIndices", "holeIndices", "normals")
+"""What is read of a Mesh that may vary over time, besides primvars."""
+
+_NONE = np.empty(0, np.int32)
+
+
+def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> Polygons:
+    """The mesh as authored, before refinement: faces that cannot be drawn are left out, holes stay."""
+    points = _points(mesh, time, issues)
+    counts, indices = _topology(mesh, time, issues) if len(points) else (_NONE, _NONE)
+    elements = count_elements(len(counts), len(points), len(indices))
+    scheme = _scheme(mesh, issues)
+    polygons = Polygons(
+        points=points,
+        counts=counts,
+        indices=indices,
+        faces=np.arange(len(counts), dtype=np.int32),
+        holes=_holes(mesh, time, len(counts), issues),
+        scheme=scheme,
+        left_handed=mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded,
+        normals=_normals(mesh, time, elements, issues) if scheme == "none" else None,
+        display_color=read_display(mesh.GetPrim(), "displayColor", 3, time, elements, issues),
+        display_opacity=read_display(mesh.GetPrim(), "displayOpacity", 1, time, elements, issues),
+    )
+    return mend_normals(_without_broken_faces(polygons, issues), issues)
+
+
+def _points(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> NDArray[np.float32]:
+    value = mesh.GetPointsAttr().Get(time)
+    points = None if value is None else floats(value, 3)
+    if points is None or not len(points):
+        issues.append("it has no points")
+        return np.empty((0, 3), np.float32)
+    return points
+
+
+def _topology(
+    mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]
+) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
+    """Corners a face, not negative, and their indices, as many; faces whose corners are missing are cut off.
+
+    The counts are not believed before they are compared: no memory is taken for what they claim.
+    """
+    counts = integers(mesh.GetFaceVertexCountsAttr().Get(time))
+    indices = integers(mesh.GetFaceVertexIndicesAttr().Get(time))
+    if counts is None or indices is None or not len(counts) or not len(indices):
+        issues.append("it has no faces")
+        return _NONE, _NONE
+    counts = np.maximum(counts, 0)
+    ends = np.cumsum(counts, dtype=np.int64)
+    complete = int(np.searchsorted(ends, len(indices), "right"))
+    if complete < len(counts):
+        issues.append(f"{len(counts) - complete} faces are left out: faceVertexIndices ends before them")
+    elif ends[-1] < len(indices):
+        issues.append(f"{len(indices) - ends[-1]} faceVertexIndices are left over after the last face")
+    return counts[:complete], indices[: ends[complete - 1] if complete else 0]
+
+
+def _scheme(mesh: UsdGeom.Mesh, issues: list[str]) -> Scheme:
+    authored_scheme = mesh.GetSubdivisionSchemeAttr().Get()
+    for scheme in SCHEMES:
+        if scheme == authored_scheme:
+            return scheme
+    issues.append(f"subdivisionScheme {authored_scheme!r} is unknown; the mesh is drawn as polygons")
+    return "none"
+
+
+def _holes(mesh: UsdGeom.Mesh, time: Usd.TimeCode, faces: int, issues: list[str]) -> NDArray[np.integer]:
+    holes = integers(mesh.GetHoleIndicesAttr().Get(time))
+    if holes is None:
+        return _NONE
+    valid = (holes >= 0) & (holes < faces)
+    if not valid.all():
+        issues.append(f"{np.count_nonzero(~valid)} holeIndices name no face")
+    return holes[valid]
+
+
+def _normals(mesh: UsdGeom.Mesh, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> Primvar | None:
+    """primvars:normals wins over normals, unless it is of no use."""
+    attribute = mesh.GetNormalsAttr()
+    sources = (
+        authored(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals"), time),
+        Authored("normals", attribute.Get(time), mesh.GetNormalsInterpolation()),
+    )
+    for source in sources:
+        normals = fit(source, 3, elements, issues)
+        if normals is not None:
+            return normals
+    return None
+
+
+def _without_broken_faces(polygons: Polygons, issues: list[str]) -> Polygons:
+    """The faces of three corners and more, all of them at points that exist and are finite."""
+    missing = (polygons.indices < 0) | (polygons.indices >= len(polygons.points))
+    adrift = np.zeros_like(missing)
+    lost = np.logical_not(np.isfinite(polygons.points).all(axis=1))
+    adrift[~missing] = lost[polygons.indices[~missing]]
+    small = polygons.counts < 3
+    reasons = {
+        "they have fewer than 3 corners": small,
+        "their indices are out of range": polygons.any_corner(missing) & ~small,
+        "their points are not finite": polygons.any_corner(adrift) & ~small,
+    }
+    for reason, faces in reasons.items():
+        if faces.any():
+            issues.append(f"{np.count_nonzero(faces)} faces are left out: {reason}")
+    return polygons.select(~np.logical_or.reduce(list(reasons.values())))

@@ -1,0 +1,43 @@
+"""The materials of one frame."""
+
+from __future__ import annotations
+
+from pxr import Usd
+
+from defshade_cli.scene.material import UNBOUND, Material
+from defshade_cli.scene.scene import Unsupported
+from defshade_cli.usd.binding import Bindings
+from defshade_cli.usd.memory import Memory
+
+
+class Palette:
+    """Materials numbered in order of first use.
+
+    Of the materials bound to a prim the first that is understood is taken, in the order full, preview, all purposes:
+    a production look that only its own renderer knows gives way to the UsdPreviewSurface beside it. Where none is
+    understood, the first is reported, once.
+    """
+
+    def __init__(self, memory: Memory, time: Usd.TimeCode) -> None:
+        self.issues: dict[Unsupported, None] = {}
+        self._memory, self._time = memory, time
+        self._numbers: dict[Material, int] = {}
+        self._chosen: dict[Bindings, int] = {}
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        return tuple(self._numbers)
+
+    def number(self, bindings: Bindings) -> int:
+        """Index into `materials` of the one that is drawn."""
+        if bindings not in self._chosen:
+            self._chosen[bindings] = self._numbers.setdefault(self._choose(bindings), len(self._numbers))
+        return self._chosen[bindings]
+
+    def _choose(self, bindings: Bindings) -> Material:
+        candidates = [self._memory.material(path, self._time) for path in bindings.candidates]
+        if not candidates:
+            return UNBOUND
+        chosen = next((candidate for candidate in candidates if candidate.understood), candidates[0])
+        self.issues.update(dict.fromkeys(chosen.issues))
+        return chosen.material

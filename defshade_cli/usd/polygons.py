@@ -1,0 +1,125 @@
+"""A polygon mesh with what lies on its faces, points and corners, before it is cut into triangles.
+
+Every surface passes through this form: a Mesh prim is read into it, a gprim is built in it, and refinement
+takes and gives it. A corner is one face-vertex.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Interpolation = Literal["constant", "uniform", "varying", "vertex", "faceVarying"]
+Scheme = Literal["none", "bilinear", "catmullClark", "loop"]
+
+SCHEMES: tuple[Scheme, ...] = ("none", "bilinear", "catmullClark", "loop")
+
+_CORNERS_AT_ONCE = 1 << 20
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Primvar:
+    """Values on a mesh: one for all, or one a face, a point or a corner.
+
+    values: (N, 3) or (N,) float32, indices resolved.
+    """
+
+    values: NDArray[np.float32]
+    interpolation: Interpolation
+
+    @property
+    def splits_points(self) -> bool:
+        """Can two corners at one point differ?"""
+        return self.interpolation in ("uniform", "faceVarying")
+
+
+@dataclass(frozen=True, eq=False)
+class Polygons:
+    """F faces with C corners over P points.
+
+    points: (P, 3) float32; those that a corner uses are finite.
+    counts: (F,) integers, each at least 3, corners a face.
+    indices: (C,) integers into points, face after face.
+    faces: (F,) int32, the authored face that each is part of.
+    holes: authored faces that shape the surface and are not drawn.
+    scheme: how the surface follows from the polygons; `none` when they are the surface.
+    left_handed: the corners run clockwise seen from outside.
+    normals: None where they follow from the shape.
+    """
+
+    points: NDArray[np.float32]
+    counts: NDArray[np.integer]
+    indices: NDArray[np.integer]
+    faces: NDArray[np.int32]
+    holes: NDArray[np.integer] = field(default_factory=lambda: np.empty(0, np.int32))
+    scheme: Scheme = "none"
+    left_handed: bool = False
+    normals: Primvar | None = None
+    display_color: Primvar | None = None
+    display_opacity: Primvar | None = None
+
+    @cached_property
+    def face_of_corner(self) -> NDArray[np.int32]:
+        """(C,) the face that each corner is part of."""
+        return np.repeat(np.arange(len(self.counts), dtype=np.int32), self.counts)
+
+    def by_size(self) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """Blocks of B faces that all have n corners: the faces (B,), and their corners (B, n)."""
+        starts = np.cumsum(self.counts, dtype=np.intp) - self.counts
+        for size in np.flatnonzero(np.bincount(self.counts)):
+            block = max(1, _CORNERS_AT_ONCE // int(size))
+            sized = np.flatnonzero(self.counts == size)
+            for first in range(0, len(sized), block):
+                faces = sized[first : first + block]
+                yield faces, starts[faces, None] + np.arange(size)
+
+    def any_corner(self, corners: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(F,) the faces with a corner for which `corners` (C,) holds."""
+        return np.bincount(self.face_of_corner[corners], minlength=len(self.counts)) > 0
+
+    def select(self, kept: NDArray[np.bool_]) -> Polygons:
+        """The faces for which `kept` (F,) holds; the points all stay."""
+        if kept.all():
+            return self
+        corners = kept[self.face_of_corner]
+
+        def pick(primvar: Primvar | None) -> Primvar | None:
+            if primvar is None or not primvar.splits_points:
+                return primvar
+            mask = kept if primvar.interpolation == "uniform" else corners
+            return replace(primvar, values=primvar.values[mask])
+
+        return replace(
+            self,
+            counts=self.counts[kept],
+            indices=self.indices[corners],
+            faces=self.faces[kept],
+            normals=pick(self.normals),
+            display_color=pick(self.display_color),
+            display_opacity=pick(self.display_opacity),
+        )
+
+    def without_holes(self) -> Polygons:
+        return self.select(~np.isin(self.faces, self.holes)) if len(self.holes) else self
+
+    def at_corners(self, primvar: Primvar) -> NDArray[np.float32]:
+        """(C, ...) a primvar of any interpolation."""
+        match primvar.interpolation:
+            case "constant":
+                return np.broadcast_to(primvar.values, (len(self.indices), *primvar.values.shape[1:]))
+            case "uniform":
+                return primvar.values[self.face_of_corner]
+            case "faceVarying":
+                return primvar.values
+            case _:
+                return primvar.values[self.indices]
+
+    def at_points(self, primvar: Primvar) -> NDArray[np.float32]:
+        """(P, ...) a primvar that does not split points."""
+        assert not primvar.splits_points
+        return np.broadcast_to(primvar.values, (len(self.points), *primvar.values.shape[1:]))

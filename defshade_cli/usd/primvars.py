@@ -1,0 +1,89 @@
+"""Primvars: read, checked against the topology, their indices resolved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+from defshade_cli.usd.polygons import Interpolation, Primvar
+from defshade_cli.usd.values import floats, integers
+
+Elements = Mapping[str, int]
+"""How many values each interpolation needs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Authored:
+    """What a primvar, or an attribute like one, says: nothing of it is checked."""
+
+    name: str
+    value: object
+    interpolation: str
+    indices: object | None = None
+
+
+def count_elements(faces: int, points: int, corners: int) -> Elements:
+    return {"constant": 1, "uniform": faces, "varying": points, "vertex": points, "faceVarying": corners}
+
+
+def authored(primvar: UsdGeom.Primvar, time: Usd.TimeCode) -> Authored | None:
+    if not primvar or not primvar.HasValue():
+        return None
+    indices = primvar.GetIndices(time) if primvar.IsIndexed() else None
+    return Authored(str(primvar.GetName()), primvar.Get(time), primvar.GetInterpolation(), indices)
+
+
+def find_display(prim: Usd.Prim, name: str) -> UsdGeom.Primvar:
+    """displayColor or displayOpacity: the prim's own, or an ancestor's where that is constant."""
+    return UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
+
+
+def read_display(
+    prim: Usd.Prim, name: str, width: int, time: Usd.TimeCode, elements: Elements, issues: list[str]
+) -> Primvar | None:
+    """displayColor or displayOpacity, all finite; None where there is none or it does not fit."""
+    primvar = fit(authored(find_display(prim, name), time), width, elements, issues)
+    if primvar is None or np.isfinite(primvar.values).all():
+        return primvar
+    issues.append(f"primvars:{name} is left out: not all of its values are finite")
+    return None
+
+
+def fit(source: Authored | None, width: int, elements: Elements, issues: list[str]) -> Primvar | None:
+    """A primvar of `width` floats a value. One that is too long is cut; one that cannot be used is left out.
+
+    Nothing authored, and an empty array, are no issue.
+    """
+    if source is None or source.value is None:
+        return None
+    values = _resolved(source, width)
+    if isinstance(values, str):
+        issues.append(f"{source.name} is left out: {values}")
+        return None
+    if not len(values):
+        return None
+    needed = elements.get(source.interpolation, 0)
+    if len(values) != needed:
+        found = f"{source.name} has {len(values)} {source.interpolation} values where {needed} are due"
+        issues.append(f"{found}: {'the first are taken' if 0 < needed < len(values) else 'it is left out'}")
+    if not 0 < needed <= len(values):
+        return None
+    return Primvar(values[:needed], cast(Interpolation, source.interpolation))
+
+
+def _resolved(source: Authored, width: int) -> NDArray[np.float32] | str:
+    """The values with their indices followed, or why that cannot be."""
+    values = floats(source.value, width)
+    if values is None:
+        return f"its type is not {width} floats a value"
+    if source.indices is None:
+        return values
+    indices = integers(source.indices)
+    if indices is None or (len(indices) and not 0 <= indices.min() <= indices.max() < len(values)):
+        return "its indices are out of range"
+    return values[indices]

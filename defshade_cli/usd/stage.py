@@ -1,0 +1,90 @@
+"""Opening a stage, and what it says about itself as a whole."""
+
+from __future__ import annotations
+
+import logging
+import math
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePath
+from typing import Any
+
+from pxr import Tf, Usd, UsdGeom, UsdUtils
+
+from defshade_cli.errors import StageNotFound
+
+log = logging.getLogger("defshade")
+
+_ADDRESS = re.compile(r"\s*<0x[0-9a-f]+>")
+
+
+def open_stage(path: Path) -> Usd.Stage:
+    """Open a .usd, .usda, .usdc or .usdz file with all its payloads.
+
+    Raises StageNotFound where there is no such file or USD cannot read it.
+    """
+    if not path.exists():
+        raise StageNotFound(f"no such file: {path}")
+    with gathered_diagnostics():
+        try:
+            return Usd.Stage.Open(str(path))
+        except Tf.ErrorException as error:
+            raise StageNotFound(f"{path} is not a USD stage: {_first_line(error)}") from None
+
+
+@contextmanager
+def gathered_diagnostics() -> Iterator[None]:
+    """Log what USD complains about inside the block, one line for each kind, in place of its own lines on stderr."""
+    delegate = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        yield
+    finally:
+        for kind in delegate.TakeCoalescedDiagnostics():
+            first, *more = (_ADDRESS.sub("", item.commentary).strip() for item in kind.unsharedItems)
+            log.warning("USD: %s%s", first, f" (and {len(more)} more like it)" if more else "")
+
+
+def stage_name(stage: Usd.Stage) -> str:
+    """The root layer's file name without suffix."""
+    return PurePath(stage.GetRootLayer().GetDisplayName()).stem
+
+
+def up_axis(stage: Usd.Stage) -> str:
+    """ "Y" or "Z"; anything else that is authored counts as USD's fallback."""
+    authored = _metadata(stage, UsdGeom.Tokens.upAxis)
+    return str(authored) if authored in ("Y", "Z") else str(UsdGeom.GetFallbackUpAxis())
+
+
+def meters_per_unit(stage: Usd.Stage) -> float:
+    """As authored where it is a positive number, else USD's fallback of 0.01."""
+    return _positive(stage, UsdGeom.Tokens.metersPerUnit, UsdGeom.LinearUnits.centimeters)
+
+
+def frames_per_second(stage: Usd.Stage) -> float:
+    """framesPerSecond, else timeCodesPerSecond, else 24, whichever first is a positive number."""
+    return _positive(stage, "framesPerSecond", _positive(stage, "timeCodesPerSecond", 24.0))
+
+
+def first_frame(stage: Usd.Stage) -> float | None:
+    """The stage's startTimeCode; None, which stands for the default time, where no time range is authored."""
+    return stage.GetStartTimeCode() if stage.HasAuthoredTimeCodeRange() else None
+
+
+def _metadata(stage: Usd.Stage, key: str) -> Any:
+    """Stage metadata of whatever type: old files hold floats where USD's own accessors raise on all but doubles."""
+    return stage.GetPseudoRoot().GetMetadata(key)
+
+
+def _positive(stage: Usd.Stage, key: str, fallback: float) -> float:
+    value = _metadata(stage, key)
+    if value is None:
+        return fallback
+    if isinstance(value, int | float) and 0.0 < value < math.inf:
+        return float(value)
+    log.warning("%s of %r counts as %g", key, value, fallback)
+    return fallback
+
+
+def _first_line(error: Tf.ErrorException) -> str:
+    return str(error.args[0].commentary).strip().partition("\n")[0]

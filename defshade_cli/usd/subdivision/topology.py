@@ -1,0 +1,124 @@
+"""The control mesh of a subdivision surface, as UsdGeomMesh writes it, checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.scene.arrays import frozen
+
+SchemeName = Literal["catmullClark", "loop", "bilinear"]
+BoundaryRule = Literal["none", "edgeOnly", "edgeAndCorner"]
+TriangleRule = Literal["catmullClark", "smooth"]
+
+
+def _no_indices() -> NDArray[np.int32]:
+    return np.zeros(0, np.int32)
+
+
+def _no_sharpnesses() -> NDArray[np.float64]:
+    return np.zeros(0)
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class Topology:
+    """UsdGeomMesh's topology attributes; the schema's text says what each means.
+
+    face_counts: (F,) int32.  face_indices: (sum of face_counts,) int32 into vertex_count points.
+    holes: face indices.
+    crease_indices: chains of vertices laid end to end, crease_lengths vertices each; crease_sharpnesses has one
+        value a chain, or one for each edge of all chains. A crease along no edge of the mesh is ignored.
+    corner_indices, corner_sharpnesses: one sharpness a vertex. Sharpness 10 and above is infinite.
+
+    Raises ValueError with the reason where the arrays do not describe a mesh that the scheme takes.
+    """
+
+    face_counts: NDArray[np.int32]
+    face_indices: NDArray[np.int32]
+    vertex_count: int
+    scheme: SchemeName = "catmullClark"
+    interpolate_boundary: BoundaryRule = "edgeAndCorner"
+    triangle_subdivision_rule: TriangleRule = "catmullClark"
+    holes: NDArray[np.int32] = field(default_factory=_no_indices)
+    crease_indices: NDArray[np.int32] = field(default_factory=_no_indices)
+    crease_lengths: NDArray[np.int32] = field(default_factory=_no_indices)
+    crease_sharpnesses: NDArray[np.float64] = field(default_factory=_no_sharpnesses)
+    corner_indices: NDArray[np.int32] = field(default_factory=_no_indices)
+    corner_sharpnesses: NDArray[np.float64] = field(default_factory=_no_sharpnesses)
+
+    def __post_init__(self) -> None:
+        for name in ("face_counts", "face_indices", "holes", "crease_indices", "crease_lengths", "corner_indices"):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.int32, -1))
+        for name in ("crease_sharpnesses", "corner_sharpnesses"):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, -1))
+        self._check_rules()
+        self._check_faces()
+        self._check_creases()
+        self._check_corners()
+
+    def _check_rules(self) -> None:
+        _require_choice("scheme", self.scheme, get_args(SchemeName))
+        _require_choice("interpolate_boundary", self.interpolate_boundary, get_args(BoundaryRule))
+        _require_choice("triangle_subdivision_rule", self.triangle_subdivision_rule, get_args(TriangleRule))
+
+    def _check_faces(self) -> None:
+        counts = self.face_counts
+        if not len(counts):
+            raise ValueError("the mesh has no faces")
+        if counts.min() < 3:
+            face = int(counts.argmin())
+            raise ValueError(f"face {face} has {counts[face]} vertices")
+        total = int(counts.sum(dtype=np.int64))
+        if total != len(self.face_indices):
+            raise ValueError(f"faces need {total} vertex indices, got {len(self.face_indices)}")
+        if self.scheme == "loop" and counts.max() > 3:
+            face = int(counts.argmax())
+            raise ValueError(f"the Loop scheme takes triangles only; face {face} has {counts[face]} vertices")
+        _require_range("face index", self.face_indices, self.vertex_count, "points")
+        _require_range("hole index", self.holes, len(counts), "faces")
+
+    def _check_creases(self) -> None:
+        lengths = self.crease_lengths
+        if len(lengths) and lengths.min() < 2:
+            raise ValueError("a crease has fewer than two vertices")
+        total = int(lengths.sum(dtype=np.int64))
+        if total != len(self.crease_indices):
+            raise ValueError(f"creases need {total} vertex indices, got {len(self.crease_indices)}")
+        edges = total - len(lengths)
+        if len(self.crease_sharpnesses) not in (len(lengths), edges):
+            raise ValueError(f"{len(self.crease_sharpnesses)} sharpnesses for {len(lengths)} creases of {edges} edges")
+        _require_range("crease index", self.crease_indices, self.vertex_count, "points")
+        if np.isnan(self.crease_sharpnesses).any():
+            raise ValueError("a crease sharpness is not a number")
+
+    def _check_corners(self) -> None:
+        if len(self.corner_indices) != len(self.corner_sharpnesses):
+            raise ValueError(f"{len(self.corner_sharpnesses)} sharpnesses for {len(self.corner_indices)} corners")
+        _require_range("corner index", self.corner_indices, self.vertex_count, "points")
+        if np.isnan(self.corner_sharpnesses).any():
+            raise ValueError("a corner sharpness is not a number")
+
+    def crease_edges(self) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """(N, 2) vertex pairs of all creases and (N,) their sharpness."""
+        chain_starts = np.cumsum(self.crease_lengths)[:-1]
+        joined = np.ones(max(len(self.crease_indices) - 1, 0), bool)
+        joined[chain_starts - 1] = False
+        pairs = np.stack([self.crease_indices[:-1], self.crease_indices[1:]], axis=1)[joined]
+        sharpness = self.crease_sharpnesses
+        if len(sharpness) != len(pairs):
+            sharpness = np.repeat(sharpness, self.crease_lengths - 1)
+        return pairs, sharpness
+
+
+def _require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise ValueError(f"{name} is {value!r}, not one of {', '.join(choices)}")
+
+
+def _require_range(name: str, indices: NDArray, count: int, of: str) -> None:
+    outside = (indices < 0) | (indices >= count)
+    if outside.any():
+        raise ValueError(f"{name} {indices[outside.argmax()]} is outside the {count} {of}")

@@ -1,0 +1,229 @@
+"""The walk over a stage: from prims to pieces.
+
+Drawn is what UsdImaging would draw: active, loaded, defined and visible prims. Inheritance of visibility and purpose,
+reset xform stacks and instances are resolved on the way down; bindings and primvars by USD at the prim itself.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Sdf, Usd, UsdGeom
+
+from defshade_cli.scene.light import Light
+from defshade_cli.scene.scene import Unsupported
+from defshade_cli.usd.binding import Bindings
+from defshade_cli.usd.geometry import Gprim
+from defshade_cli.usd.instancing import Piece, Placement, place, read_display_of_instances
+from defshade_cli.usd.kind import Kind
+from defshade_cli.usd.light import is_light, read_light
+from defshade_cli.usd.memory import Memory
+from defshade_cli.usd.point_instancer import has_varying_copies, read_point_instancer
+from defshade_cli.usd.xform import IDENTITY, matrices, matrix
+
+_PROTOTYPE_CHILDREN = Usd.PrimIsActive & Usd.PrimIsLoaded
+"""Below a PointInstancer's prototype also classes and overs, by which the schema says to hide prototypes."""
+
+
+class Standing(NamedTuple):
+    """What a prim hands down. in_world: root_from_prim leads to world space, because an xform stack was reset."""
+
+    root_from_prim: Gf.Matrix4d = IDENTITY
+    in_world: bool = False
+    purpose: str | None = None
+
+
+class Sharing(NamedTuple):
+    """What native instances have in common that are placed together."""
+
+    prototype: Sdf.Path
+    bindings: Bindings
+    in_world: bool
+    purpose: str | None
+
+
+class Instance(NamedTuple):
+    """order: among the instances of its prototype in a subtree."""
+
+    prim: Usd.Prim
+    root_from_prim: Gf.Matrix4d
+    order: int
+
+
+class Traversal:
+    """One walk at one time, in which each prototype is read once.
+
+    issues: what is left out, as the keys of a dictionary to keep their order.
+    dormant: something is absent now, but not at all times.
+    """
+
+    def __init__(self, stage: Usd.Stage, memory: Memory, time: Usd.TimeCode, purposes: Sequence[str]) -> None:
+        self.issues: dict[Unsupported, None] = {}
+        self.dormant = False
+        self._stage, self._memory, self._time, self._purposes = stage, memory, time, purposes
+        self._prototypes: dict[Sdf.Path, tuple[Piece, ...] | None] = {}
+        memory.xforms.SetTime(time)
+
+    def read_stage(self) -> tuple[Piece, ...]:
+        return self._read(self._stage.GetPseudoRoot().GetChildren(), Standing())
+
+    def _read(
+        self, roots: Iterable[Usd.Prim], above: Standing, predicate: object = Usd.PrimDefaultPredicate
+    ) -> tuple[Piece, ...]:
+        """The pieces of the subtree below and with `roots`."""
+        pieces: list[Piece] = []
+        instances: dict[Sharing, list[Instance]] = defaultdict(list)
+        met: Counter[Sdf.Path] = Counter()
+        stack = [(root, above) for root in reversed(list(roots))]
+        while stack:
+            prim, above = stack.pop()
+            kind = self._memory.kinds.of(prim)
+            if kind is Kind.SHADING or not self._is_visible(prim):
+                continue
+            here = self._stand(prim, above)
+            pieces.extend(self._own_pieces(prim, kind, here))
+            if kind is Kind.POINT_INSTANCER:
+                pieces.extend(self._copies(prim, here))
+            elif prim.IsInstance():
+                prototype = prim.GetPrototype().GetPath()
+                sharing = Sharing(prototype, self._memory.bindings(prim.GetPath()), here.in_world, here.purpose)
+                instances[sharing].append(Instance(prim, here.root_from_prim, met[prototype]))
+                met[prototype] += 1
+            else:
+                stack.extend((child, here) for child in reversed(prim.GetFilteredChildren(predicate)))
+        for sharing, found in instances.items():
+            pieces.extend(self._instances(sharing, found))
+        return tuple(pieces)
+
+    def _is_visible(self, prim: Usd.Prim) -> bool:
+        if not prim.IsA(UsdGeom.Imageable):
+            return True
+        visibility = UsdGeom.Imageable(prim).GetVisibilityAttr()
+        if visibility.Get(self._time) != UsdGeom.Tokens.invisible:
+            return True
+        self.dormant |= visibility.ValueMightBeTimeVarying()
+        return False
+
+    def _stand(self, prim: Usd.Prim, above: Standing) -> Standing:
+        local, resets = self._memory.xforms.GetLocalTransformation(prim)
+        root_from_prim = local if resets else local * above.root_from_prim
+        purpose = prim.GetAttribute(UsdGeom.Tokens.purpose)
+        own = str(purpose.Get()) if purpose and purpose.HasAuthoredValue() else above.purpose
+        return Standing(root_from_prim, resets or above.in_world, own)
+
+    def _own_pieces(self, prim: Usd.Prim, kind: Kind, here: Standing) -> Iterator[Piece]:
+        """What the prim itself is, whatever stands below it."""
+        if is_light(prim):
+            light, issues = read_light(prim, self._time)
+            self._report(prim, *(issue.reason for issue in issues))
+            if light is not None:
+                yield self._piece(prim, here, light)
+        if mode := _draw_mode(prim):
+            self._report(prim, f"draw mode {mode}: the full geometry is drawn")
+        if kind is Kind.GPRIM and here.purpose in (None, *self._purposes):
+            yield from self._gprim(prim, here)
+        elif kind is Kind.UNDRAWN:
+            self._report(prim, f"prims of type {prim.GetTypeName()} are not drawn")
+        elif kind is Kind.UNKNOWN:
+            self._report(prim, f"no schema defines the type {prim.GetTypeName()}")
+
+    def _gprim(self, prim: Usd.Prim, here: Standing) -> Iterator[Piece]:
+        gprim = self._memory.gprim(prim, self._time)
+        if gprim is None:
+            self._report(prim, f"prims of type {prim.GetTypeName()} are not drawn")
+            return
+        self.issues.update(dict.fromkeys(gprim.issues))
+        if gprim.groups:
+            bindings = tuple(self._memory.bindings(group.path) for group in gprim.groups)
+            yield self._piece(prim, here, gprim, bindings)
+
+    def _piece(
+        self, prim: Usd.Prim, here: Standing, content: Gprim | Light, bindings: tuple[Bindings, ...] = ()
+    ) -> Piece:
+        color = content.display_color if isinstance(content, Gprim) else None
+        opacity = content.display_opacity if isinstance(content, Gprim) else None
+        return Piece(
+            content,
+            matrix(here.root_from_prim)[None],
+            (self._memory.shown(prim.GetPath()),),
+            np.full(1, -1, np.int32),
+            np.full((1, 3), np.nan if color is None else color, np.float32),
+            np.full(1, np.nan if opacity is None else opacity, np.float32),
+            here.purpose,
+            bindings,
+            here.in_world,
+        )
+
+    def _instances(self, sharing: Sharing, found: list[Instance]) -> Iterator[Piece]:
+        """The copies of a native prototype."""
+        prototype, first = self._stage.GetPrimAtPath(sharing.prototype), found[0].prim
+        shown_as = self._memory.name_prototype(prototype, first)
+        displays = [self._display(instance.prim) for instance in found]
+        placement = Placement(
+            matrices([instance.root_from_prim for instance in found]),
+            np.array([instance.order for instance in found], np.int32),
+            np.concatenate([color for color, _ in displays]),
+            np.concatenate([opacity for _, opacity in displays]),
+            sharing.purpose,
+            sharing.bindings,
+            sharing.in_world,
+            prototype=shown_as,
+            roots=tuple(self._memory.shown(instance.prim.GetPath()) for instance in found),
+        )
+        if sharing.prototype not in self._prototypes:
+            self._prototypes[sharing.prototype] = self._read(prototype.GetChildren(), Standing())
+        yield from place(self._prototypes[sharing.prototype] or (), placement)
+
+    def _copies(self, prim: Usd.Prim, here: Standing) -> Iterator[Piece]:
+        """The copies that a PointInstancer makes."""
+        swarm = read_point_instancer(prim, self._time)
+        self._report(prim, *swarm.issues)
+        self.dormant |= not swarm.placements and has_varying_copies(prim)
+        for path, placement in swarm.placements:
+            placed = replace(
+                placement,
+                root_from_copy=matrix(here.root_from_prim) @ placement.root_from_copy,
+                purpose=here.purpose,
+                bindings=self._memory.bindings(prim.GetPath()),
+                in_world=here.in_world,
+            )
+            yield from place(self._point_prototype(path, prim), placed)
+
+    def _point_prototype(self, path: Sdf.Path, instancer: Usd.Prim) -> tuple[Piece, ...]:
+        """A prototype's subtree with its root's own transform; of what stands above it only the purpose counts."""
+        if path not in self._prototypes:
+            root = self._stage.GetPrimAtPath(path)
+            if not root or not root.IsActive():
+                self._report(instancer, f"there is no prototype {self._memory.shown(path)}")
+                return ()
+            self._prototypes[path] = None
+            above = UsdGeom.Imageable(root.GetParent()).ComputePurposeInfo()
+            standing = Standing(purpose=str(above.purpose) if above.isInheritable else None)
+            self._prototypes[path] = self._read([root], standing, _PROTOTYPE_CHILDREN)
+        pieces = self._prototypes[path]
+        if pieces is None:
+            self._report(instancer, "it is part of its own prototype")
+        return pieces or ()
+
+    def _display(self, prim: Usd.Prim) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        issues: list[str] = []
+        display = read_display_of_instances(prim, self._time, 1, issues)
+        self._report(prim, *issues)
+        return display
+
+    def _report(self, prim: Usd.Prim, *reasons: str) -> None:
+        path = self._memory.shown(prim.GetPath())
+        self.issues.update(dict.fromkeys(Unsupported(path, reason) for reason in reasons))
+
+
+def _draw_mode(prim: Usd.Prim) -> str | None:
+    """The draw mode that a model asks for, where it is not the full geometry."""
+    if not prim.HasAPI(UsdGeom.ModelAPI):
+        return None
+    mode = UsdGeom.ModelAPI(prim).GetModelDrawModeAttr().Get()
+    return None if mode in (UsdGeom.Tokens.inherited, UsdGeom.Tokens.default_) else str(mode)

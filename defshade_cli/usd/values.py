@@ -1,0 +1,26 @@
+"""Attribute values as NumPy arrays, without a copy where the type allows it. What is authored may be of any type."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def floats(value: object, width: int) -> NDArray[np.float32] | None:
+    """(N, width) float32, or (N,) for width 1, of a Vt array or of a lone value; None for anything else."""
+    array = np.asarray(value)
+    if array.dtype.kind not in "iuf":
+        return None
+    element = () if width == 1 else (width,)
+    if array.shape == element:
+        array = array[None]
+    if array.shape[1:] != element:
+        return None
+    with np.errstate(over="ignore"):  # a double out of range becomes inf, which readers look for
+        return array.astype(np.float32, copy=False)
+
+
+def integers(value: object) -> NDArray[np.integer] | None:
+    """(N,) integers; None for anything else."""
+    array = np.asarray(value)
+    return array if array.dtype.kind in "iu" and array.ndim == 1 else None

@@ -1,0 +1,136 @@
+"""Opening stages, what USD says meanwhile, and what a stage says about itself."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+from pathlib import Path
+
+import pytest
+from pxr import UsdUtils
+from stages import positions, stage_of
+
+from defshade_cli.errors import StageNotFound
+from defshade_cli.usd.reader import StageReader
+from defshade_cli.usd.stage import first_frame, frames_per_second, meters_per_unit, open_stage, stage_name, up_axis
+
+CUBE = '#usda 1.0\ndef Cube "cube" {\n}\n'
+BROKEN_REFERENCES = """#usda 1.0
+def "a" (references = @missing_a.usda@) {
+}
+def "b" (references = @missing_b.usda@) {
+}
+"""
+
+
+def test_a_missing_file_says_so(tmp_path: Path) -> None:
+    with pytest.raises(StageNotFound, match=r"no such file: .*nothing\.usda"):
+        open_stage(tmp_path / "nothing.usda")
+
+
+@pytest.mark.parametrize("name", ["text.usda", "text.usdc", "text.usdz", "text.txt"])
+def test_what_is_not_usd_says_so_in_one_line(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("hello")
+    with pytest.raises(StageNotFound, match=r"is not a USD stage: .+") as caught:
+        open_stage(tmp_path / name)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_folder_is_no_stage(tmp_path: Path) -> None:
+    with pytest.raises(StageNotFound, match="is not a USD stage"):
+        open_stage(tmp_path)
+
+
+@pytest.mark.parametrize("suffix", ["usd", "usda", "usdc", "usdz"])
+def test_every_format_opens(tmp_path: Path, suffix: str) -> None:
+    stage = stage_of('def Cube "cube" {\n}')
+    path = tmp_path / f"cube.{suffix}"
+    if suffix == "usdz":
+        stage.GetRootLayer().Export(str(tmp_path / "inside.usdc"))
+        assert UsdUtils.CreateNewUsdzPackage(str(tmp_path / "inside.usdc"), str(path))
+    else:
+        stage.GetRootLayer().Export(str(path))
+    opened = open_stage(path)
+    assert stage_name(opened) == "cube"
+    assert positions(StageReader(opened).read(None)) == [(0, 0, 0)]
+
+
+def test_usd_is_gathered_instead_of_scrolling(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "broken.usda").write_text(BROKEN_REFERENCES)
+    with caplog.at_level(logging.WARNING, "defshade"):
+        open_stage(tmp_path / "broken.usda")
+    assert capfd.readouterr().err == ""
+    (message,) = [record.getMessage() for record in caplog.records]
+    assert "Could not open asset" in message and message.endswith("(and 1 more like it)")
+    assert "0x" not in message, "addresses differ from run to run"
+
+
+def test_payloads_are_loaded(tmp_path: Path) -> None:
+    (tmp_path / "part.usda").write_text('#usda 1.0\n(\ndefaultPrim = "cube"\n)\ndef Cube "cube" {\n}\n')
+    (tmp_path / "whole.usda").write_text('#usda 1.0\ndef "model" (payload = @part.usda@) {\n}\n')
+    assert len(StageReader(open_stage(tmp_path / "whole.usda")).read(None).drawables) == 1
+
+
+@pytest.mark.parametrize(
+    ("metadata", "axis"), [("", "Y"), ('upAxis = "Z"', "Z"), ('upAxis = "X"', "Y"), ('upAxis = "up"', "Y")]
+)
+def test_the_up_axis_is_y_or_z(metadata: str, axis: str) -> None:
+    assert up_axis(stage_of("", metadata)) == axis
+
+
+@pytest.mark.parametrize(
+    ("metadata", "metres"),
+    [("", 0.01), ("metersPerUnit = 1", 1.0), ("metersPerUnit = 0", 0.01), ("metersPerUnit = -2", 0.01)],
+)
+def test_metres_are_positive(metadata: str, metres: float) -> None:
+    assert meters_per_unit(stage_of("", metadata)) == metres
+
+
+def test_metres_may_be_single_precision(assets: Path) -> None:
+    """UsdGeom's own accessor raises on the float metadata of old files."""
+    assert meters_per_unit(open_stage(assets / "tiny_blender_exports_a" / "suzanne.usdc")) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("metadata", "rate"),
+    [
+        ("", 24.0),
+        ("framesPerSecond = 25\ntimeCodesPerSecond = 50", 25.0),
+        ("timeCodesPerSecond = 50", 50.0),
+        ("timeCodesPerSecond = 0", 24.0),
+        ("timeCodesPerSecond = -30", 24.0),
+    ],
+)
+def test_frames_per_second_are_positive(metadata: str, rate: float) -> None:
+    assert frames_per_second(stage_of("", metadata)) == rate
+
+
+@pytest.mark.parametrize(
+    ("metadata", "frame"),
+    [
+        ("", None),
+        ("startTimeCode = 3\nendTimeCode = 9", 3.0),
+        ("startTimeCode = -5\nendTimeCode = -1", -5.0),
+        ("startTimeCode = 9\nendTimeCode = 3", 9.0),
+    ],
+)
+def test_the_first_frame_is_the_start_of_the_range(metadata: str, frame: float | None) -> None:
+    assert first_frame(stage_of("", metadata)) == frame
+
+
+@pytest.mark.parametrize("rate", [0, -24])
+def test_time_codes_without_a_rate_do_not_hang(rate: int) -> None:
+    text = """def Cube "cube" {
+        double3 xformOp:translate.timeSamples = { 0: (0, 0, 0), 10: (10, 0, 0) }
+        uniform token[] xformOpOrder = ["xformOp:translate"]
+    }"""
+    reader = StageReader(stage_of(text, f"timeCodesPerSecond = {rate}\nstartTimeCode = 0\nendTimeCode = 10"))
+    assert positions(reader.read(10.0)) == [(10, 0, 0)]
+
+
+def test_a_file_that_came_from_elsewhere_keeps_its_name(tmp_path: Path) -> None:
+    (tmp_path / "shot.v012.usda").write_text(CUBE)
+    shutil.copy(tmp_path / "shot.v012.usda", tmp_path / "copy.usda")
+    assert stage_name(open_stage(tmp_path / "shot.v012.usda")) == "shot.v012"
