@@ -32,7 +32,7 @@ endef
 
 demo: .venv/.ready
 	mkdir -p out
-	$(BIN)/defshade render scenes/showcase.usda -o out/showcase.exr -o out/showcase.png
+	$(BIN)/defshade render scenes/showcase.usda --samples 8 -o out/showcase.exr -o out/showcase.png
 	echo "defshade: the demo is out/showcase.png, and scene-linear in out/showcase.exr"
 
 test: .venv/.ready-dev

@@ -41,7 +41,8 @@ def placed(scene: Scene) -> dict[str, NDArray[np.float64]]:
 
 def positions(scene: Scene) -> list[tuple[float, ...]]:
     """Where the origins of all drawn instances are, sorted."""
-    return sorted(tuple(matrix[:3, 3].round(6).tolist()) for matrix in placed(scene).values())
+    matrices = np.concatenate([drawable.world_from_object for drawable in scene.drawables])
+    return sorted(tuple(row) for row in matrices[:, :3, 3].round(6).tolist())
 
 
 def drawable_at(scene: Scene, path: str) -> Drawable:

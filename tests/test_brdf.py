@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from defshade_cli.gpu.context import Gpu
 from defshade_cli.measure import brdf, furnace
 from defshade_cli.measure.brdf import D_GGX, Surface, alpha_from_roughness
 from defshade_cli.settings import SHADINGS, Shading
@@ -170,7 +171,7 @@ def test_responses_scale_their_own_lobe(model: Model) -> None:
 
 
 @pytest.mark.parametrize("shading", SHADINGS)
-def test_glsl_agrees_with_float64(gpu: object, shading: Shading) -> None:
+def test_glsl_agrees_with_float64(gpu: Gpu, shading: Shading) -> None:
     surface = _random_surface(20000, seed=8)
     light = _around(np.random.default_rng(9), surface.normal)
     expected = brdf.evaluate_brdf(surface, light, shading=shading)

@@ -1,17 +1,29 @@
-"""The command line as a user meets it: each test is a process, judged by its exit code, stdout, stderr and files."""
+"""The command line as a user meets it, judged by exit code, stdout, stderr and files.
+
+What is refused before any driver is loaded runs in this process, all else in one of its own.
+"""
 
 from __future__ import annotations
 
+import io
 import json
+import logging
 import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import patch
 
 import pytest
 
 from defshade_cli import __version__
+from defshade_cli.cli import main
+from defshade_cli.cli.options import Reporting
+from defshade_cli.cli.progress import make_progress
 
 TRIANGLE = """#usda 1.0
 (
@@ -68,6 +80,30 @@ def defshade(*arguments: str, **environment: str) -> subprocess.CompletedProcess
     return subprocess.run(
         command, capture_output=True, text=True, check=False, env={**os.environ, "PYTHONPATH": path, **environment}
     )
+
+
+@pytest.fixture
+def package_log() -> Iterator[None]:
+    """The package's logger as it was, afterwards."""
+    logger = logging.getLogger("defshade")
+    handlers, level = logger.handlers, logger.level
+    yield
+    logger.handlers = handlers
+    logger.setLevel(level)
+
+
+def defshade_here(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """The same in this process."""
+    with (
+        patch.object(sys, "argv", ["defshade", *arguments]),
+        redirect_stdout(io.StringIO()) as stdout,
+        redirect_stderr(io.StringIO()) as stderr,
+        pytest.raises(SystemExit) as leaving,
+    ):
+        main()
+    code = leaving.value.code
+    assert isinstance(code, int)
+    return subprocess.CompletedProcess(arguments, code, stdout.getvalue(), stderr.getvalue())
 
 
 def succeed(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -129,10 +165,8 @@ def test_version() -> None:
         pytest.param(2, "proxies", ["render", "s.usda", "--purposes", "proxies"], id="unknown purpose"),
         pytest.param(3, "missing.usda", ["render", "missing.usda"], id="no such stage"),
         pytest.param(3, "missing.usda", ["inspect", "missing.usda"], id="no such stage to inspect"),
-        pytest.param(3, "noise.usda", ["render", "stages/noise.usda"], id="not USD inside"),
         pytest.param(3, "picture.png", ["render", "stages/picture.png"], id="not USD at all"),
         pytest.param(3, "stages", ["render", "stages"], id="a folder"),
-        pytest.param(3, "empty", ["render", "stages/empty.usda"], id="no geometry"),
         pytest.param(3, "Ear", ["render", "stages/triangle.usda", "--camera", "Ear"], id="unknown camera"),
         pytest.param(3, "/Triangle", ["render", "stages/triangle.usda", "--camera", "/Triangle"], id="not a camera"),
         pytest.param(
@@ -144,8 +178,20 @@ def test_version() -> None:
         pytest.param(5, "missing.exr", ["compare", "missing.exr", "missing.exr"], id="nothing to compare"),
     ],
 )
+@pytest.mark.usefixtures("package_log")
 def test_wrong_use_is_refused(folder: Path, exit_code: int, mention: str, arguments: list[str]) -> None:
-    assert_refused(defshade(*arguments), exit_code, mention)
+    assert_refused(defshade_here(*arguments), exit_code, mention)
+    assert not files(folder)
+
+
+def test_stage_without_geometry_is_refused(folder: Path) -> None:
+    assert_refused(defshade("render", "stages/empty.usda"), 3, "empty")
+    assert not files(folder)
+
+
+def test_file_that_is_not_usd_is_refused(folder: Path) -> None:
+    """In a process of its own, for what the parser itself prints."""
+    assert_refused(defshade("render", "stages/noise.usda"), 3, "noise.usda")
     assert not files(folder)
 
 
@@ -220,7 +266,7 @@ def test_several_frames_are_numbered_by_default(folder: Path) -> None:
 
 
 def test_skip_renders_only_what_is_missing(folder: Path) -> None:
-    arguments = ("render", "stages/triangle.usda", *SMALL, "--existing", "skip")
+    arguments = ("gbuffer", "stages/triangle.usda", *SMALL, "--existing", "skip")
     succeed(*arguments, "--frames", "2", "-o", "f.####.exr")
     before = (folder / "f.0002.exr").stat().st_mtime_ns
     done = succeed(*arguments, "--frames", "1:2", "-o", "f.####.exr")
@@ -240,29 +286,47 @@ PROTOCOLS = {
         "openjd_progress: 100.0",
         "openjd_status: frame 3, 3 of 3",
     ],
+    "auto": [f"frame {frame}  → f.{frame}.exr  0.75 s" for frame in (1, 2, 3)],
     "none": [],
 }
 
 
+def _result(frame: float) -> SimpleNamespace:
+    paths = (Path(f"f.{frame:g}.exr"),)
+    return SimpleNamespace(frame=frame, paths=paths, skipped=False, seconds={"read": 0.25, "draw": 0.5})
+
+
 @pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_progress_protocols(protocol: str) -> None:
-    done = succeed("render", "stages/triangle.usda", *SMALL, "--frames", "1:3", "--progress", protocol)
-    assert done.stderr.splitlines() == PROTOCOLS[protocol]
+def test_progress_protocols(protocol: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with make_progress(Reporting(progress=protocol), total=3) as progress:
+        for frame in (1.0, 2.0, 3.0):
+            progress.frame(_result(frame))
+    printed = capsys.readouterr()
+    assert printed.err.splitlines() == PROTOCOLS[protocol]
+    assert not printed.out
 
 
-def test_json_progress_is_a_line_a_frame() -> None:
-    done = succeed("render", "stages/triangle.usda", *SMALL, "--frames", "1:2", "--progress", "json")
-    events = [json.loads(line) for line in done.stderr.splitlines()]
-    assert [(e["event"], e["done"], e["total"]) for e in events] == [
-        ("started", 0, 2),
-        ("frame", 1, 2),
-        ("frame", 2, 2),
+def test_json_progress_is_a_line_a_frame(capsys: pytest.CaptureFixture[str]) -> None:
+    with make_progress(Reporting(progress="json"), total=1) as progress:
+        progress.frame(_result(7.5))
+    events = [json.loads(line) for line in capsys.readouterr().err.splitlines()]
+    assert events == [
+        {"event": "started", "done": 0, "total": 1},
+        {"event": "frame", "done": 1, "total": 1, "frame": 7.5, "paths": ["f.7.5.exr"], "skipped": False}
+        | {"seconds": {"read": 0.25, "draw": 0.5}},
     ]
-    assert events[1]["paths"] == ["triangle.0001.exr"]
 
 
+def test_more_frames_than_announced_is_not_more_than_all(capsys: pytest.CaptureFixture[str]) -> None:
+    with make_progress(Reporting(progress="alf"), total=1) as progress:
+        progress.frame(_result(1.0))
+        progress.frame(_result(2.0))
+    assert capsys.readouterr().err.splitlines() == ["ALF_PROGRESS 0%", "ALF_PROGRESS 100%", "ALF_PROGRESS 100%"]
+
+
+@pytest.mark.usefixtures("package_log")
 def test_a_failure_is_told_to_the_farm() -> None:
-    done = defshade("render", "missing.usda", "--progress", "openjd")
+    done = defshade_here("render", "missing.usda", "--progress", "openjd")
     assert done.returncode == 3
     assert any(line.startswith("openjd_fail: ") for line in done.stderr.splitlines())
 

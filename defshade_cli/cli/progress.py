@@ -159,7 +159,6 @@ def start_logging(reporting: Reporting) -> None:
     logger = logging.getLogger("defshade")
     logger.setLevel(level)
     logger.handlers = [_Echo()]
-    logger.propagate = False
 
 
 def frame_name(frame: float | None) -> str:

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import logging
 import shlex
 import sys
+from typing import TYPE_CHECKING
 
 import click
 
 from defshade_cli.cli.options import HeadedCommand, Reporting, epilog, takes_job
-from defshade_cli.cli.progress import make_progress, start_logging
+from defshade_cli.cli.progress import frame_name, make_progress, start_logging
 from defshade_cli.cli.stats import Stats
 from defshade_cli.settings import RenderJob
+
+if TYPE_CHECKING:
+    from defshade_cli.render import FrameResult
+
+log = logging.getLogger("defshade")
 
 _EPILOG = epilog(
     "defshade render scene.usda",
@@ -42,5 +49,12 @@ def execute(job: RenderJob, reporting: Reporting) -> None:
         for result in run(job, command=shlex.join(["defshade", *sys.argv[1:]])):
             progress.frame(result)
             stats.add(result)
+            _log_details(result)
             for path in result.paths:
                 click.echo(path)
+
+
+def _log_details(result: FrameResult) -> None:
+    log.info("frame %s: %s", frame_name(result.frame), ", ".join(f"{k} {v:.3f} s" for k, v in result.seconds.items()))
+    for decision in result.plan.decisions if result.plan else ():
+        log.info("%s: %s, %s", decision.subject, decision.choice, decision.reason)

@@ -23,7 +23,7 @@ from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.stage import open_stage
 
 SIZE = (480, 270)
-_HEADER = "| stage | " + " | ".join(f"{layout} | p99.9" for layout in LAYOUTS) + " |"
+_HEADER = "| stage | " + " | ".join(f"{layout}, median | p99.9" for layout in LAYOUTS) + " |"
 _RULE = "|---|" + "---:|---:|" * len(LAYOUTS)
 
 

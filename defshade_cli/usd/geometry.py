@@ -14,9 +14,8 @@ from pxr import Usd, UsdGeom
 
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.scene.scene import Unsupported
-from defshade_cli.usd import mesh as meshes
 from defshade_cli.usd.gprims import read_solid, size_attributes
-from defshade_cli.usd.mesh import read_mesh
+from defshade_cli.usd.mesh import MESH_ATTRIBUTES, read_mesh
 from defshade_cli.usd.normals import with_normals
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.primvars import find_display
@@ -68,7 +67,7 @@ def read_gprim(prim: Usd.Prim, time: Usd.TimeCode) -> Gprim | None:
 
 def is_time_varying(prim: Usd.Prim) -> bool:
     """Does anything that read_gprim reads, primvars inherited and face subsets included, differ over time?"""
-    names = meshes.ATTRIBUTES if prim.IsA(UsdGeom.Mesh) else size_attributes(prim)
+    names = MESH_ATTRIBUTES if prim.IsA(UsdGeom.Mesh) else size_attributes(prim)
     primvars = (
         UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals"),
         find_display(prim, "displayColor"),

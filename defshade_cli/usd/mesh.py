@@ -11,7 +11,7 @@ from defshade_cli.usd.polygons import SCHEMES, Polygons, Primvar, Scheme
 from defshade_cli.usd.primvars import Authored, Elements, authored, count_elements, fit, read_display
 from defshade_cli.usd.values import floats, integers
 
-ATTRIBUTES = ("points", "faceVertexCounts", "faceVertexIndices", "holeIndices", "normals")
+MESH_ATTRIBUTES = ("points", "faceVertexCounts", "faceVertexIndices", "holeIndices", "normals")
 """What is read of a Mesh that may vary over time, besides primvars."""
 
 _NONE = np.empty(0, np.int32)

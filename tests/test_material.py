@@ -1,0 +1,280 @@
+"""Which material is bound, and what UsdShade networks become."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from stages import material_names, reasons, stage_of
+
+from defshade_cli.scene.material import UNBOUND, Material
+from defshade_cli.scene.scene import Scene
+from defshade_cli.usd.reader import StageReader
+
+BINDS = '(prepend apiSchemas = ["MaterialBindingAPI"])'
+
+
+def surface(name: str, inputs: str = "", more: str = "") -> str:
+    """A material with a UsdPreviewSurface; `more` stands beside the shader."""
+    return f"""def Material "{name}" {{
+        token outputs:surface.connect = </{name}/surface.outputs:surface>
+        def Shader "surface" {{
+            uniform token info:id = "UsdPreviewSurface"
+            {inputs}
+            token outputs:surface
+        }}
+        {more}
+    }}
+    """
+
+
+def foreign(name: str, context: str) -> str:
+    """A material for one renderer alone."""
+    return f"""def Material "{name}" {{
+        token outputs:{context}:surface.connect = </{name}/surface.outputs:out>
+        def Shader "surface" {{
+            token outputs:out
+        }}
+    }}
+    """
+
+
+def read(text: str, frame: float | None = None) -> Scene:
+    return StageReader(stage_of(text)).read(frame)
+
+
+def of_cube(materials: str, frame: float | None = None) -> Material:
+    """What a cube with the material at /m is drawn with."""
+    scene = read(f'{materials}\ndef Cube "cube" {BINDS} {{\nrel material:binding = </m>\n}}', frame)
+    (drawable,) = scene.drawables
+    return scene.materials[drawable.subsets[0].material]
+
+
+def issues(materials: str) -> list[str]:
+    return reasons(read(f'{materials}\ndef Cube "cube" {BINDS} {{\nrel material:binding = </m>\n}}'), "/m")
+
+
+# The surface
+
+
+def test_nothing_authored_is_the_schemas_surface() -> None:
+    assert of_cube(surface("m")) == Material("/m")
+
+
+def test_every_input_is_read() -> None:
+    inputs = """color3f inputs:diffuseColor = (0.1, 0.2, 0.3)
+        color3f inputs:emissiveColor = (1, 2, 3)
+        int inputs:useSpecularWorkflow = 1
+        color3f inputs:specularColor = (0.4, 0.5, 0.6)
+        float inputs:metallic = 0.25
+        float inputs:roughness = 0.75
+        float inputs:clearcoat = 0.5
+        float inputs:clearcoatRoughness = 0.125
+        float inputs:opacity = 0.5
+        float inputs:opacityThreshold = 0.25
+        token inputs:opacityMode = "presence"
+        float inputs:ior = 1.25"""
+    found = of_cube(surface("m", inputs))
+    np.testing.assert_allclose(found.diffuse_color, (0.1, 0.2, 0.3), rtol=1e-6)
+    np.testing.assert_allclose(found.specular_color, (0.4, 0.5, 0.6), rtol=1e-6)
+    assert found.emissive_color == (1, 2, 3)
+    assert found.use_specular_workflow is True
+    assert (found.metallic, found.roughness, found.clearcoat, found.clearcoat_roughness) == (0.25, 0.75, 0.5, 0.125)
+    assert (found.opacity, found.opacity_threshold, found.opacity_mode, found.ior) == (0.5, 0.25, "presence", 1.25)
+    assert found.uses_display_color is False
+
+
+def test_inputs_connect_through_interfaces() -> None:
+    text = """def Material "m" {
+        color3f inputs:tint = (1, 0, 0)
+        float inputs:unset
+        token outputs:surface.connect = </m/graph.outputs:surface>
+        def NodeGraph "graph" {
+            color3f inputs:tint.connect = </m.inputs:tint>
+            token outputs:surface.connect = </m/graph/surface.outputs:surface>
+            def Shader "surface" {
+                uniform token info:id = "UsdPreviewSurface"
+                color3f inputs:diffuseColor.connect = </m/graph.inputs:tint>
+                float inputs:roughness.connect = </m.inputs:unset>
+                token outputs:surface
+            }
+        }
+    }"""
+    assert of_cube(text) == Material("/m", diffuse_color=(1, 0, 0))
+    assert issues(text) == []
+
+
+def test_inputs_vary_over_time() -> None:
+    stage = stage_of(
+        surface("m", "float inputs:roughness.timeSamples = { 0: 0, 10: 1 }")
+        + f'def Cube "cube" {BINDS} {{\nrel material:binding = </m>\n}}'
+    )
+    reader = StageReader(stage)
+    assert [reader.read(frame).materials[0].roughness for frame in (0, 5, 10)] == [0.0, 0.5, 1.0]
+
+
+def test_values_of_another_type_are_converted_or_reported() -> None:
+    assert of_cube(surface("m", "float inputs:diffuseColor = 0.5")).diffuse_color == (0.5, 0.5, 0.5)
+    assert of_cube(surface("m", "double inputs:roughness = 0.25")).roughness == 0.25
+    assert issues(surface("m", 'string inputs:roughness = "shiny"')) == ["not read: roughness (str)"]
+
+
+# What computes an input
+
+READER = """def Shader "reader" {{
+    uniform token info:id = "UsdPrimvarReader_{type}"
+    string inputs:varname = "{name}"
+    {fallback}
+    {type} outputs:result
+}}"""
+DIFFUSE_FROM_READER = "color3f inputs:diffuseColor.connect = </m/reader.outputs:result>"
+TEXTURE = """def Shader "image" {{
+    uniform token info:id = "UsdUVTexture"
+    asset inputs:file = @wood.png@
+    {fallback}
+    float3 outputs:rgb
+    float outputs:g
+}}"""
+FROM_TEXTURE = """color3f inputs:diffuseColor.connect = </m/image.outputs:rgb>
+    float inputs:roughness.connect = </m/image.outputs:g>"""
+
+
+def test_a_reader_of_display_color_is_understood() -> None:
+    text = surface("m", DIFFUSE_FROM_READER, READER.format(type="float3", name="displayColor", fallback=""))
+    assert of_cube(text).uses_display_color
+    assert issues(text) == []
+
+
+def test_a_reader_of_another_primvar_falls_back() -> None:
+    fallback = "float3 inputs:fallback = (1, 0, 0)"
+    text = surface("m", DIFFUSE_FROM_READER, READER.format(type="float3", name="paint", fallback=fallback))
+    assert of_cube(text) == Material("/m", diffuse_color=(1, 0, 0))
+    assert issues(text) == ["not read: diffuseColor (primvar paint)"]
+
+
+def test_a_texture_falls_back_channel_by_channel() -> None:
+    text = surface("m", FROM_TEXTURE, TEXTURE.format(fallback="float4 inputs:fallback = (1, 0.25, 0, 1)"))
+    assert of_cube(text) == Material("/m", diffuse_color=(1, 0.25, 0), roughness=0.25)
+    assert issues(text) == ["not read: diffuseColor (UsdUVTexture), roughness (UsdUVTexture)"]
+
+
+def test_a_texture_without_fallback_leaves_the_schemas_default() -> None:
+    assert of_cube(surface("m", FROM_TEXTURE, TEXTURE.format(fallback=""))) == Material("/m")
+
+
+def test_a_material_is_reported_once() -> None:
+    cubes = "".join(f'def Cube "c{i}" {BINDS} {{\nrel material:binding = </m>\n}}\n' for i in range(3))
+    assert len(reasons(read(surface("m", FROM_TEXTURE, TEXTURE.format(fallback="")) + cubes), "/m")) == 1
+
+
+@pytest.mark.parametrize(
+    ("material", "reason"),
+    [
+        ('def Material "m" {\n}', "no surface"),
+        ("", "the bound material does not exist"),
+        (
+            foreign("m", "mtlx"),
+            "no UsdPreviewSurface, only mtlx:surface",
+        ),
+        (
+            surface("m").replace("UsdPreviewSurface", "ND_standard_surface_surfaceshader"),
+            "surface ND_standard_surface_surfaceshader is not UsdPreviewSurface",
+        ),
+        (
+            surface("m").replace('info:id = "UsdPreviewSurface"', 'info:implementationSource = "sourceAsset"'),
+            "surface shader of source code is not UsdPreviewSurface",
+        ),
+    ],
+)
+def test_what_is_not_understood_is_reported_and_drawn_as_unbound(material: str, reason: str) -> None:
+    assert of_cube(material) == Material("/m", uses_display_color=True)
+    assert issues(material) == [reason]
+
+
+# Binding
+
+
+def test_an_unbound_prim_has_the_unbound_material() -> None:
+    scene = read('def Cube "cube" {\n}')
+    assert scene.materials == (UNBOUND,)
+    assert scene.unsupported == ()
+
+
+ALL = surface("m") + surface("full") + surface("preview") + surface("other")
+FOREIGN = foreign("foreign", "ri")
+
+
+@pytest.mark.parametrize(
+    ("bindings", "bound"),
+    [
+        ({"": "m"}, "m"),
+        ({"": "m", ":preview": "preview"}, "preview"),
+        ({"": "m", ":preview": "preview", ":full": "full"}, "full"),
+        ({"": "m", ":full": "foreign"}, "m"),
+        ({"": "foreign", ":preview": "preview"}, "preview"),
+        ({"": "m", ":preview": "preview", ":full": "foreign"}, "preview"),
+        ({":full": "foreign"}, "foreign"),
+    ],
+)
+def test_the_first_purpose_that_is_understood_is_drawn(bindings: dict[str, str], bound: str) -> None:
+    body = "\n".join(f"rel material:binding{purpose} = </{name}>" for purpose, name in bindings.items())
+    scene = read(f'{ALL}{FOREIGN}def Cube "cube" {BINDS} {{\n{body}\n}}')
+    assert material_names(scene, "/cube") == [f"/{bound}"]
+    assert bool(reasons(scene, "/foreign")) == (bound == "foreign"), "what is not drawn is not reported"
+
+
+@pytest.mark.parametrize(("strength", "bound"), [("weakerThanDescendants", "other"), ("strongerThanDescendants", "m")])
+def test_strength_decides_between_ancestors(strength: str, bound: str) -> None:
+    text = f"""def Xform "group" {BINDS} {{
+        rel material:binding = </m> (bindMaterialAs = "{strength}")
+        def Cube "cube" {BINDS} {{
+            rel material:binding = </other>
+        }}
+        def Cube "plain" {{
+        }}
+    }}"""
+    scene = read(ALL + text)
+    assert material_names(scene, "/group/cube") == [f"/{bound}"]
+    assert material_names(scene, "/group/plain") == ["/m"]
+
+
+def test_collections_bind_their_members() -> None:
+    text = """def Xform "group" (prepend apiSchemas = ["MaterialBindingAPI", "CollectionAPI:some"]) {
+        uniform token collection:some:expansionRule = "expandPrims"
+        rel collection:some:includes = </group/a>
+        rel material:binding = </m>
+        rel material:binding:collection:some = [</group.collection:some>, </other>]
+        def Cube "a" {
+        }
+        def Cube "b" {
+        }
+    }"""
+    scene = read(ALL + text)
+    assert material_names(scene, "/group/a") == ["/other"]
+    assert material_names(scene, "/group/b") == ["/m"]
+
+
+def test_subsets_have_materials_of_their_own() -> None:
+    text = f"""def Mesh "mesh" {BINDS} {{
+        uniform token subdivisionScheme = "none"
+        int[] faceVertexCounts = [3, 3, 3]
+        int[] faceVertexIndices = [0, 1, 2, 0, 2, 3, 0, 3, 4]
+        point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (-1, 0, 0)]
+        rel material:binding = </m>
+        def GeomSubset "part" {BINDS} {{
+            uniform token elementType = "face"
+            uniform token familyName = "materialBind"
+            int[] indices = [1]
+            rel material:binding = </other>
+        }}
+    }}"""
+    scene = read(ALL + text)
+    assert material_names(scene, "/mesh") == ["/m", "/other"]
+    (drawable,) = scene.drawables
+    assert [(subset.first, subset.count) for subset in drawable.subsets] == [(0, 2), (2, 1)]
+    assert scene.meshes[0].faces.tolist() == [0, 2, 1]
+
+
+def test_equal_bindings_share_one_material() -> None:
+    cubes = "".join(f'def Cube "c{i}" {BINDS} {{\nrel material:binding = </m>\n}}\n' for i in range(3))
+    scene = read(ALL + cubes)
+    assert [material.path for material in scene.materials] == ["/m"]
