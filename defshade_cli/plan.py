@@ -61,7 +61,8 @@ class Plan:
     camera: conformed to the image.  clip: (near, far), the camera's range tightened to the geometry.
     exposure: linear, the camera's and the settings' together.
     planes: of the GBuffer; lights: sorted quads, spheres, cones.
-    cutout: some opacity is below 1.  data_pass: data layers need an unjittered float GBuffer of their own.
+    shadows: some light casts them.  cutout: some opacity is below 1.
+    data_pass: data layers need an unjittered float GBuffer of their own.
     """
 
     size: tuple[int, int]
@@ -74,6 +75,7 @@ class Plan:
     layers: tuple[str, ...]
     planes: tuple[Plane, ...]
     lights: tuple[PlannedLight, ...]
+    shadows: bool
     cutout: bool
     data_pass: bool
     decisions: tuple[Decision, ...]
@@ -116,6 +118,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         layers=settings.layers,
         planes=planes,
         lights=lights,
+        shadows=_casts_shadows(settings, lights),
         cutout=cutout,
         data_pass=data_pass,
         decisions=_explain(settings, planes, lights, cutout, data_layers, data_pass),
@@ -144,6 +147,10 @@ def _has_cutout(scene: Scene) -> bool:
     varying = [m.display_opacity for m in scene.meshes if m.display_opacity is not None]
     constant = [d.display_opacity for d in scene.drawables]
     return any(m.uses_display_color for m in scene.materials) and any((o < 1.0).any() for o in varying + constant)
+
+
+def _casts_shadows(settings: RenderSettings, lights: tuple[PlannedLight, ...]) -> bool:
+    return settings.shadows and any(planned.light.casts_shadow for planned in lights)
 
 
 def _tight_clip(camera: Camera, bounds: NDArray[np.float64]) -> tuple[float, float]:
@@ -177,7 +184,8 @@ def _plan_lights(scene: Scene, exposure: float, settings: RenderSettings) -> tup
 
 
 def _peak(light: Light) -> float:
-    strength = light.irradiance if isinstance(light, DistantLight) else light.intensity_on_axis
+    """What a point of the light can send one way: all of L · A, which no profile exceeds."""
+    strength = light.irradiance if isinstance(light, DistantLight) else light.emission * light.power_scale
     return float(np.max(strength)) * max(light.diffuse, light.specular)
 
 

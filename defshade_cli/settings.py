@@ -26,6 +26,7 @@ class RenderSettings:
     width: pixels; the height then follows the camera's aspect. At most one of size and width is given.
     samples: jittered samples a pixel; 1 is a sample at the pixel's centre.
     exposure: stops added to the camera's own.
+    shadows: False lights every surface that faces a light.
     light_tolerance: scene-linear value that all dropped light together may reach in one pixel.
     """
 
@@ -38,6 +39,7 @@ class RenderSettings:
     exposure: float = 0.0
     purposes: tuple[str, ...] = ("default", "render")
     light_tolerance: float = 1e-5
+    shadows: bool = True
 
 
 @dataclass(frozen=True, slots=True)

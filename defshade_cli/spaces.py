@@ -56,6 +56,14 @@ def rigid(matrix: Matrix) -> Matrix:
     return result
 
 
+def inverse_rigid(b_from_a: Matrix) -> Matrix:
+    """a_from_b of a rotation with a translation, exactly: the transpose, not a solver."""
+    inverse = np.eye(4)
+    inverse[:3, :3] = b_from_a[:3, :3].T
+    inverse[:3, 3] = -inverse[:3, :3] @ b_from_a[:3, 3]
+    return inverse
+
+
 def conform_window(window: Window, aspect: float, policy: ConformPolicy = "expandAperture") -> Window:
     """Fit (left, right, bottom, top) to the image's aspect as UsdRenderSettings' aspectRatioConformPolicy says.
 

@@ -1,6 +1,6 @@
 #include "lib/view.glsl"
 #include "lib/surface.glsl"
-#include "lib/hash.glsl"
+#include "lib/cutout.glsl"
 #include "generated/planes.glsl"
 
 layout(std430, binding = 2) readonly buffer MaterialBlock { Material materials[]; };
@@ -10,16 +10,6 @@ in vec4 display_color;
 flat in uint material_index;
 flat in uint instance_index;
 flat in float handedness;
-
-#ifdef CUTOUT
-// opacityThreshold is an alpha test; other opacities are a coin a sample, so that the mean is sorted blending.
-bool is_cut_out(Material material, float opacity) {
-    if (material.opacity_threshold > 0.0) return opacity < material.opacity_threshold;
-    if (opacity >= 1.0) return false;
-    uvec4 seed = uvec4(gl_FragCoord.xy, view.sample_index, instance_index);
-    return opacity <= 0.0 || opacity < unit_hash(seed);
-}
-#endif
 
 vec3 facing_normal() {
     float side = gl_FrontFacing ? handedness : -handedness;
@@ -47,8 +37,7 @@ Surface surface_of(Material material) {
 void main() {
     Material material = materials[material_index];
 #ifdef CUTOUT
-    float opacity = material.uses_display_color != 0u ? display_color.a : material.opacity;
-    if (is_cut_out(material, opacity)) discard;
+    if (is_cut_out(material, display_color.a, instance_index)) discard;
 #endif
     write_planes(surface_of(material));
 }

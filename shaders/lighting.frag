@@ -1,6 +1,7 @@
 #include "lib/view.glsl"
 #include "lib/surface.glsl"
 #include "lib/light.glsl"
+#include "lib/shadow.glsl"
 #include "generated/planes.glsl"
 
 flat in uint light_index;
@@ -15,6 +16,7 @@ void main() {
     vec3 irradiance = irradiance_from(lights[light_index], position, l);
     if (irradiance == vec3(0.0)) discard;
     Surface surface = read_planes(pixel);
+    irradiance *= visibility(lights[light_index], position, surface.normal, l);
     vec3 f = evaluate_brdf(surface, direction_to_eye(position), l, lights[light_index].response);
     radiance = vec4(view.exposure * irradiance * f, 0.0);
 }

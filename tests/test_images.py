@@ -35,11 +35,12 @@ SETTINGS = RenderSettings(size=(160, 90))
 CASES: dict[str, tuple[str, float | None, RenderSettings]] = {
     **{path.stem: (path.stem, None, SETTINGS) for path in sorted(resources.SCENES.glob("*.usda"))},
     "animated.17": ("animated", 17.0, SETTINGS),
+    "materials.unshadowed": ("materials", None, replace(SETTINGS, shadows=False)),
     "materials.classic": ("materials", None, replace(SETTINGS, shading="classic")),
     "materials.packed": ("materials", None, replace(SETTINGS, layout="packed")),
     "materials.rgba8": ("materials", None, replace(SETTINGS, layout="rgba8")),
     "purposes.guide": ("purposes", None, replace(SETTINGS, purposes=("default", "proxy", "guide"))),
-    "showcase.16": ("showcase", None, replace(SETTINGS, samples=16)),
+    "showcase.8": ("showcase", None, replace(SETTINGS, samples=8)),
 }
 """Reference → stage, frame, settings."""
 

@@ -8,7 +8,6 @@ import pytest
 from build import GREY, bulb, camera, drawable, quad, scene, sphere, sun
 
 from defshade_cli.errors import UsageError
-from defshade_cli.passes.accumulation import pixel_positions
 from defshade_cli.passes.view import camera_depth, clip_from_camera
 from defshade_cli.plan import image_size, make_plan
 from defshade_cli.scene.camera import Camera
@@ -91,14 +90,6 @@ def test_an_off_centre_window_lands_on_the_image_corners() -> None:
     matrix = clip_from_camera(view, view.window, (1.0, 10.0), False)
     corners = np.array([[-0.2, -0.1, -1, 1], [0.6, 0.3, -1, 1]]) @ matrix.T
     np.testing.assert_allclose(corners[:, :2] / corners[:, 3:], [[-1, -1], [1, 1]], atol=1e-12)
-
-
-def test_samples_are_centred_and_spread() -> None:
-    assert list(pixel_positions(1)) == [(0.5, 0.5)]
-    points = np.array(list(pixel_positions(256)))
-    counts, *_ = np.histogram2d(*points.T, bins=8, range=[[0, 1], [0, 1]])
-    assert counts.min() >= 2 and counts.max() <= 6  # 4 a cell on average
-    np.testing.assert_allclose(points.mean(0), 0.5, atol=0.01)
 
 
 def test_opacity_decides_the_cutout() -> None:

@@ -172,7 +172,8 @@ def _image_options(layers: Sequence[str]) -> list[Function]:
             default=_RENDER.samples,
             default_text=str(_RENDER.samples),
             metavar="N",
-            help="Jittered samples a pixel of the beauty; data layers are one sample at the pixel's centre.",
+            help="Samples a pixel of the beauty: places in the pixel, on the lens and on every light. One sample takes "
+            "lights for points. Data layers are one sample at the pixel's centre.",
         ),
         option(
             "--layers",
@@ -188,6 +189,12 @@ def _image_options(layers: Sequence[str]) -> list[Function]:
             default=_RENDER.shading,
             default_text=str(_RENDER.shading),
             help="Lighting equation: UsdPreviewSurface's, or the classic one of deferred renderers.",
+        ),
+        option(
+            "--shadows/--no-shadows",
+            default=_RENDER.shadows,
+            default_text="--shadows",
+            help="Whether geometry hides lights.",
         ),
         option(
             "--gbuffer",

@@ -15,7 +15,7 @@ from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 
-VIEW, INSTANCES, MATERIALS, LIGHTS = range(4)
+VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS = range(5)
 """Binding points of the storage buffers, as the shaders declare them."""
 
 _COMMAND = np.dtype([(name, "u4") for name in ("count", "instances", "first_index", "base_vertex", "base_instance")])

@@ -1,22 +1,11 @@
-"""Samples: where in its pixel each one lies, and their sum in float32."""
+"""Samples summed in float32."""
 
 from __future__ import annotations
-
-from collections.abc import Iterator
 
 import moderngl
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.targets import Target
-
-# Roberts 2018, "The Unreasonable Effectiveness of Quasirandom Sequences": powers of 1/ρ, ρ³ = ρ + 1.
-_R2 = (0.7548776662466927, 0.5698402909980532)
-
-
-def pixel_positions(count: int) -> Iterator[tuple[float, float]]:
-    """`count` places in the unit square, the R2 sequence; the first, and so a single one, is the centre."""
-    for i in range(count):
-        yield ((0.5 + i * _R2[0]) % 1.0, (0.5 + i * _R2[1]) % 1.0)
 
 
 class AccumulationPass:

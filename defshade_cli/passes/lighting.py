@@ -20,11 +20,12 @@ from defshade_cli.gpu.records import record
 from defshade_cli.gpu.targets import Target
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.planes import Plane, read_source, uses_standard_depth
+from defshade_cli.passes.shadows import ShadowAtlas
 from defshade_cli.passes.volumes import cone_volume, sphere_volume
 from defshade_cli.plan import Plan, PlannedLight, Volume
-from defshade_cli.scene.light import DistantLight, Profile, Shaping
+from defshade_cli.scene.emission import Emitter
+from defshade_cli.scene.light import Profile, Shaping
 from defshade_cli.settings import Layout, Shading
-from defshade_cli.spaces import normalize
 
 _PROFILES: tuple[Profile, ...] = ("uniform", "cosine", "sine")
 _NO_CONE = 2.0 * math.pi
@@ -38,17 +39,18 @@ class LightingVariant:
     layout: Layout
     shading: Shading
     orthographic: bool
+    shadows: bool
     volumes: tuple[Volume, ...]
 
     @classmethod
     def of(cls, plan: Plan) -> LightingVariant:
         orthographic = plan.camera.projection == "orthographic"
-        return cls(plan.planes, plan.layout, plan.shading, orthographic, plan.volumes)
+        return cls(plan.planes, plan.layout, plan.shading, orthographic, plan.shadows, plan.volumes)
 
     @property
     def defines(self) -> list[str]:
         flags = ["CLASSIC"] * (self.shading == "classic") + ["ORTHOGRAPHIC"] * self.orthographic
-        return [plane.define for plane in self.planes] + flags
+        return [plane.define for plane in self.planes] + flags + ["SHADOWS"] * self.shadows
 
 
 class LightingPass:
@@ -66,37 +68,42 @@ class LightingPass:
             program = gpu.shaders.program(*files, defines=defines, generated=generated)
             self._volumes[volume] = _volume_array(gpu, volume, program)
 
-    def draw(self, lights: Sequence[PlannedLight], gbuffer: GBuffer, radiance: Target) -> None:
-        """Emission and coverage, then the bound Light records on top; `radiance` is overwritten."""
+    def begin(self, gbuffer: GBuffer, radiance: Target) -> None:
+        """Emission and coverage; `radiance` is overwritten."""
         radiance.framebuffer.use()
         radiance.framebuffer.depth_mask = False
         self._context.enable_only(moderngl.NOTHING)
-        self._bind(self._emission.program, gbuffer)
+        self._bind(self._emission.program, gbuffer, None)
         self._emission.render(vertices=3)
+
+    def add(
+        self, lights: Sequence[PlannedLight], gbuffer: GBuffer, radiance: Target, shadows: ShadowAtlas | None = None
+    ) -> None:
+        """The volumes of `lights`, whose records are bound, on top of `radiance`."""
+        radiance.framebuffer.use()
         self._context.enable_direct(DEPTH_CLAMP)
         self._context.blend_func = moderngl.ONE, moderngl.ONE
         self._context.cull_face = "front"
         self._context.depth_func = ">" if uses_standard_depth(gbuffer.layout) else "<"
         kinds = [planned.volume for planned in lights]
-        for volume, array in self._volumes.items():
-            self._draw_volumes(volume, array, gbuffer, kinds.index(volume), kinds.count(volume))
+        for volume in dict.fromkeys(kinds):
+            self._bind(self._volumes[volume].program, gbuffer, shadows)
+            self._draw_volumes(volume, kinds.index(volume), kinds.count(volume))
         self._context.disable_direct(DEPTH_CLAMP)
 
-    def _draw_volumes(
-        self, volume: Volume, array: moderngl.VertexArray, gbuffer: GBuffer, first: int, count: int
-    ) -> None:
-        local = moderngl.DEPTH_TEST | moderngl.CULL_FACE
+    def _draw_volumes(self, volume: Volume, first: int, count: int) -> None:
+        array, local = self._volumes[volume], moderngl.DEPTH_TEST | moderngl.CULL_FACE
         self._context.enable_only(moderngl.BLEND | (moderngl.NOTHING if volume == "quad" else local))
-        self._bind(array.program, gbuffer)
         array.program["first_light"] = first
         array.render(vertices=3 if volume == "quad" else -1, instances=count)
 
-    def _bind(self, program: moderngl.Program, gbuffer: GBuffer) -> None:
-        planes = {"depth": gbuffer.target.depth, **gbuffer.target.textures}
-        for unit, (name, texture) in enumerate(planes.items()):
-            if texture and f"plane_{name}" in program:
+    def _bind(self, program: moderngl.Program, gbuffer: GBuffer, shadows: ShadowAtlas | None) -> None:
+        textures = {"plane_depth": gbuffer.target.depth, "shadow_atlas": shadows.depth if shadows else None}
+        textures |= {f"plane_{name}": texture for name, texture in gbuffer.target.textures.items()}
+        for unit, (name, texture) in enumerate(textures.items()):
+            if texture and name in program:
                 texture.use(unit)
-                program[f"plane_{name}"] = unit
+                program[name] = unit
 
 
 def _volume_array(gpu: Gpu, volume: Volume, program: moderngl.Program) -> moderngl.VertexArray:
@@ -108,27 +115,20 @@ def _volume_array(gpu: Gpu, volume: Volume, program: moderngl.Program) -> modern
     return gpu.keep(gpu.context.vertex_array(program, [(vertices, "3f", "corner")], indices))
 
 
-def light_records(lights: Sequence[PlannedLight], eye: NDArray[np.float64]) -> NDArray:
+def light_records(
+    lights: Sequence[PlannedLight], emitters: Sequence[Emitter], eye: NDArray[np.float64], shadows: ShadowAtlas | None
+) -> NDArray:
     """One Light record each, positions relative to the eye."""
     records = np.zeros(len(lights), record("Light"))
-    for row, planned in zip(records, lights, strict=True):
-        light = planned.light
-        row["axis"] = light.axis
-        row["tangent"] = _tangent(light.axis, light.world_from_light[:3, 0])
-        row["response"] = (light.diffuse, light.specular)
-        row["profile"] = _PROFILES.index(light.profile)
-        _set_shaping(row, light.shaping)
-        if isinstance(light, DistantLight):
-            row["intensity"] = light.irradiance
-        else:
-            row["intensity"], row["reach"] = light.intensity_on_axis, planned.reach
-            row["position"] = light.position - eye
+    for row, planned, emitter in zip(records, lights, emitters, strict=True):
+        row["position"], row["axis"], row["facing"] = emitter.position - eye, emitter.axis, emitter.facing
+        row["profile"], row["intensity"] = _PROFILES.index(emitter.profile), emitter.intensity
+        row["response"] = (planned.light.diffuse, planned.light.specular)
+        row["reach"] = planned.reach
+        _set_shaping(row, planned.light.shaping)
+    if shadows:
+        records["first_shadow"], records["shadow_count"] = shadows.first, shadows.count
     return records
-
-
-def _tangent(axis: NDArray[np.float64], x_axis: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The light's X axis where a shear has not laid it along the emission; any perpendicular would serve a volume."""
-    return normalize(x_axis - axis * np.dot(axis, x_axis))
 
 
 def _set_shaping(row: np.void, shaping: Shaping | None) -> None:

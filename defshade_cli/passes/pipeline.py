@@ -9,13 +9,17 @@ from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.residence import LIGHTS, VIEW, DrawList, GpuScene, RecordBuffer
+from defshade_cli.gpu.targets import Target
 from defshade_cli.image.film import Film
-from defshade_cli.passes.accumulation import AccumulationPass, pixel_positions
+from defshade_cli.passes.accumulation import AccumulationPass
+from defshade_cli.passes.emitters import light_batches
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
 from defshade_cli.passes.lighting import LightingPass, LightingVariant, light_records
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
-from defshade_cli.passes.view import CENTRE, view_record
+from defshade_cli.passes.sampling import CENTRE, Sample, samples
+from defshade_cli.passes.shadows import ShadowPass
+from defshade_cli.passes.view import view_record
 from defshade_cli.plan import Plan
 from defshade_cli.scene.scene import Scene
 
@@ -30,6 +34,9 @@ class Pipeline:
         self._lights = RecordBuffer(gpu, LIGHTS)
         self._gbuffer_pass = cache(lambda variant: GBufferPass(gpu, variant))
         self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant))
+        self._shadow_pass = cache(
+            lambda cutout, color_varies: ShadowPass(gpu, cutout=cutout, color_varies=color_varies)
+        )
         self._accumulation = AccumulationPass(gpu)
 
     def render(self, scene: Scene, plan: Plan) -> Film:
@@ -37,8 +44,7 @@ class Pipeline:
         draws = self._scene.update(scene)
         layers: dict[str, NDArray[np.float32]] = {}
         if plan.lit:
-            self._lights.write(light_records(plan.lights, scene.camera.position))
-            layers["beauty"] = self._beauty(draws, plan)
+            layers["beauty"] = self._beauty(draws, scene, plan)
         if len(layers) < len(plan.layers):
             layers |= data_layers(self._data_planes(draws, plan), plan)
         return Film(
@@ -54,18 +60,32 @@ class Pipeline:
         """The float GBuffer at the pixels' centres: what the float64 reference is evaluated on."""
         return self._drawn_planes(self._scene.update(scene), plan)
 
-    def _beauty(self, draws: DrawList, plan: Plan) -> NDArray[np.float32]:
+    def _beauty(self, draws: DrawList, scene: Scene, plan: Plan) -> NDArray[np.float32]:
         gbuffer = self._frame.gbuffer(plan.size, plan.planes, plan.layout)
-        sample = self._frame.radiance("sample", plan.size, gbuffer)
-        total = self._frame.radiance("total", plan.size) if plan.samples > 1 else sample
-        lighting = self._lighting_pass(LightingVariant.of(plan))
+        radiance = self._frame.radiance("sample", plan.size, gbuffer)
+        total = self._frame.radiance("total", plan.size) if plan.samples > 1 else radiance
         total.framebuffer.clear()
-        for index, position in enumerate(pixel_positions(plan.samples)):
-            self._draw_gbuffer(draws, plan, gbuffer, position, index)
-            lighting.draw(plan.lights, gbuffer, sample)
+        for sample in samples(plan.samples):
+            self._draw_gbuffer(draws, plan, gbuffer, sample)
+            self._light(draws, scene, plan, sample, gbuffer, radiance)
             if plan.samples > 1:
-                self._accumulation.add(sample, total)
+                self._accumulation.add(radiance, total)
         return np.divide(total.read("radiance"), plan.samples, dtype=np.float32)
+
+    def _light(
+        self, draws: DrawList, scene: Scene, plan: Plan, sample: Sample, gbuffer: GBuffer, radiance: Target
+    ) -> None:
+        """One sample of every light: as many at a time as the shadow atlas holds."""
+        lighting = self._lighting_pass(LightingVariant.of(plan))
+        lighting.begin(gbuffer, radiance)
+        for batch in light_batches(scene, plan, sample):
+            shadows = None
+            if plan.shadows:
+                shadow_pass = self._shadow_pass(plan.cutout, draws.color_varies)
+                shadows = shadow_pass.draw(draws, [lit.shadow_cameras for lit in batch], sample.texel_offset)
+            lights, emitters = [lit.planned for lit in batch], [lit.emitter for lit in batch]
+            self._lights.write(light_records(lights, emitters, plan.camera.position, shadows))
+            lighting.add(lights, gbuffer, radiance, shadows)
 
     def _data_planes(self, draws: DrawList, plan: Plan) -> Planes:
         """Planes for the data layers: the beauty's own where it drew them in float at the pixels' centres."""
@@ -78,9 +98,7 @@ class Pipeline:
         self._draw_gbuffer(draws, plan, gbuffer, CENTRE)
         return read_planes(gbuffer, plan)
 
-    def _draw_gbuffer(
-        self, draws: DrawList, plan: Plan, gbuffer: GBuffer, position: tuple[float, float], sample: int = 0
-    ) -> None:
-        self._view.write(view_record(plan, gbuffer.layout, position, sample))
+    def _draw_gbuffer(self, draws: DrawList, plan: Plan, gbuffer: GBuffer, sample: Sample) -> None:
+        self._view.write(view_record(plan, gbuffer.layout, sample))
         variant = GBufferVariant(gbuffer.planes, gbuffer.layout, plan.cutout, draws.color_varies)
         self._gbuffer_pass(variant).draw(draws, gbuffer)

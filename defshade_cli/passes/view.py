@@ -2,34 +2,60 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.records import record
 from defshade_cli.passes.planes import uses_standard_depth
+from defshade_cli.passes.sampling import CENTRE, Sample
 from defshade_cli.plan import Plan
 from defshade_cli.scene.camera import Camera
 from defshade_cli.settings import Layout
-from defshade_cli.spaces import Matrix, Window
-
-CENTRE = (0.5, 0.5)
+from defshade_cli.spaces import Matrix, Window, inverse_rigid, rigid
 
 
-def view_record(plan: Plan, layout: Layout, jitter: tuple[float, float] = CENTRE, sample: int = 0) -> NDArray:
-    """(1,) View; `jitter` is the sample's place in its pixel, (0.5, 0.5) for the centre."""
+def view_record(plan: Plan, layout: Layout, sample: Sample = CENTRE) -> NDArray:
+    """(1,) View of one sample: its place in the pixel moves the window, its place on the lens the eye."""
     camera, standard = plan.camera, uses_standard_depth(layout)
-    window = _jittered(camera.window, plan.size, jitter)
+    lens = lens_offset(camera, sample.lens)
+    window = _seen_from(lens, camera, _jittered(camera.window, plan.size, sample.pixel))
+    relative_from_camera = rigid(camera.world_from_camera)
+    relative_from_camera[:3, 3] = relative_from_camera[:3, :3] @ lens
     view = np.zeros(1, record("View"))
-    rotation = np.eye(4)
-    rotation[:3, :3] = camera.world_from_camera[:3, :3]
-    view["clip_from_relative"] = (clip_from_camera(camera, window, plan.clip, standard) @ rotation.T).T
-    view["relative_from_camera"] = rotation.T
+    clip_from_relative = clip_from_camera(camera, window, plan.clip, standard) @ inverse_rigid(relative_from_camera)
+    view["clip_from_relative"] = clip_from_relative.T
+    view["relative_from_camera"] = relative_from_camera.T
     view["window"] = window
     view["depth_coefficients"] = depth_coefficients(camera, plan.clip, standard)
     view["size"] = plan.size
     view["exposure"] = plan.exposure
-    view["sample_index"] = sample
+    view["sample_index"] = sample.index
     return view
+
+
+def lens_offset(camera: Camera, u: tuple[float, float]) -> NDArray[np.float64]:
+    """(3,) place on the thin lens in camera space, scene units: a disk of diameter focal length / f-stop.
+
+    Zero for a pinhole, an orthographic camera, or one without a focus distance.
+    Square to disk: Shirley & Chiu 1997, "A Low Distortion Map Between Disk and Square".
+    """
+    a, b = 2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0
+    if camera.f_stop <= 0.0 or camera.focus_distance <= 0.0 or camera.projection != "perspective" or a == b == 0.0:
+        return np.zeros(3)
+    r, angle = (a, math.pi / 4 * b / a) if abs(a) > abs(b) else (b, math.pi / 2 - math.pi / 4 * a / b)
+    radius = 0.5 * camera.focal_length / camera.f_stop
+    return radius * r * np.array([math.cos(angle), math.sin(angle), 0.0])
+
+
+def _seen_from(lens: NDArray[np.float64], camera: Camera, window: Window) -> Window:
+    """The window sheared so that the plane of focus stays where it is."""
+    if not lens.any():
+        return window
+    dx, dy = lens[:2] / camera.focus_distance
+    left, right, bottom, top = window
+    return left - dx, right - dx, bottom - dy, top - dy
 
 
 def clip_from_camera(camera: Camera, window: Window, clip: tuple[float, float], standard: bool) -> Matrix:

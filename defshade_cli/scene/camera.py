@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.scene.arrays import frozen
-from defshade_cli.spaces import ConformPolicy, Matrix, Window, conform_window
+from defshade_cli.spaces import ConformPolicy, Matrix, Window, conform_window, inverse_rigid
 
 Projection = Literal["perspective", "orthographic"]
 
@@ -49,11 +49,7 @@ class Camera:
 
     @property
     def camera_from_world(self) -> Matrix:
-        rotation = self.world_from_camera[:3, :3].T
-        inverse = np.eye(4)
-        inverse[:3, :3] = rotation
-        inverse[:3, 3] = -rotation @ self.position
-        return inverse
+        return inverse_rigid(self.world_from_camera)
 
     @property
     def aspect(self) -> float:

@@ -58,6 +58,7 @@ class Light:
     diffuse: float = 1.0
     specular: float = 1.0
     shaping: Shaping | None = None
+    casts_shadow: bool = True
 
     kind: ClassVar[str]
     profile: ClassVar[Profile] = "uniform"

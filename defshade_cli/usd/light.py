@@ -69,9 +69,10 @@ def _common(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any]:
     color = np.array(_input(prim, "color", time), np.float64)
     if _input(prim, "enableColorTemperature", time):
         color = color * temperature_color(_input(prim, "colorTemperature", time))
+    casts_shadow = _input(prim, "shadow:enable", time) if prim.HasAPI(UsdLux.ShadowAPI) else True
     names = ("intensity", "exposure", "normalize", "diffuse", "specular")
     shaping = _shaping(prim, time) if prim.HasAPI(UsdLux.ShapingAPI) else None
-    return {"color": color, "shaping": shaping} | {name: _input(prim, name, time) for name in names}
+    return {"color": color, "shaping": shaping, "casts_shadow": casts_shadow} | {name: _input(prim, name, time) for name in names}
 
 
 def _shaping(prim: Usd.Prim, time: Usd.TimeCode) -> Shaping:

@@ -17,10 +17,10 @@ vec3 shaping(Light light, float cosine, float sine) {
     return cone * mix(light.focus_tint, vec3(1.0), focus);
 }
 
-// Far field of the light's shape over its value on axis.
-float profile(Light light, vec3 emission_direction, float cosine) {
-    if (light.profile == PROFILE_COSINE) return max(cosine, 0.0);
-    if (light.profile == PROFILE_SINE) return length(cross(light.tangent, emission_direction));
+// Emission of the light's shape, or of a point on it, over its greatest.
+float profile(Light light, vec3 emission_direction) {
+    if (light.profile == PROFILE_COSINE) return max(dot(light.facing, emission_direction), 0.0);
+    if (light.profile == PROFILE_SINE) return length(cross(light.facing, emission_direction));
     return 1.0;
 }
 
@@ -36,6 +36,6 @@ vec3 irradiance_from(Light light, vec3 position, out vec3 l) {
     if (distance_squared >= light.reach * light.reach) return vec3(0.0);
     float cosine = dot(-l, light.axis);
     float sine = length(cross(l, light.axis));
-    return light.intensity * shaping(light, cosine, sine) * (profile(light, -l, cosine) / distance_squared);
+    return light.intensity * shaping(light, cosine, sine) * (profile(light, -l) / distance_squared);
 #endif
 }

@@ -2,7 +2,7 @@
 
 struct View {
     mat4 clip_from_relative;
-    mat4 relative_from_camera;
+    mat4 relative_from_camera; // its offset: the sample's place on the lens
     vec4 window;               // left, right, bottom, top on the plane one unit ahead
     vec2 depth_coefficients;   // camera depth z: 1 / z (perspective) or z (orthographic) = x * stored + y
     vec2 size;                 // pixels
@@ -38,11 +38,20 @@ struct Light {
     float reach;
     vec3 axis;                 // unit, the direction of emission
     float cone_angle;          // radians off the axis; pi for no cone
-    vec3 tangent;              // unit, the light's X axis
+    vec3 facing;               // unit, what the profile is measured from
     float cone_smooth_start;   // radians: where the fall to the cone's edge begins
     vec3 intensity;            // candela-like on axis; irradiance of a distant light
     float focus;
     vec3 focus_tint;
     uint profile;
     vec2 response;             // multipliers of the diffuse and of the specular lobe
+    uint first_shadow;         // shadow map, the first of six for a light that sees all around
+    uint shadow_count;         // 0: casts none
+};
+
+struct ShadowMap {
+    mat4 clip_from_relative;
+    vec4 tile;                 // place in the atlas: offset and size, texture coordinates
+    float texel;               // width of a texel one unit ahead; of every texel for a distant light
+    float resolution;          // texels a side
 };

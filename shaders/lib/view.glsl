@@ -7,7 +7,7 @@ vec3 direction_to_eye(vec3 position) {
 #ifdef ORTHOGRAPHIC
     return normalize(view.relative_from_camera[2].xyz);
 #else
-    return -normalize(position);
+    return normalize(view.relative_from_camera[3].xyz - position);
 #endif
 }
 
@@ -30,5 +30,5 @@ vec3 position_at(vec2 pixel, float depth) {
 #else
     vec3 position_camera = vec3(p * depth, -depth);
 #endif
-    return mat3(view.relative_from_camera) * position_camera;
+    return (view.relative_from_camera * vec4(position_camera, 1.0)).xyz;
 }

@@ -1,0 +1,69 @@
+"""What stands for each light in one sample, and the shadow maps that it takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.passes.sampling import Sample
+from defshade_cli.passes.shadows import CAPACITY, ShadowExtent, shadow_cameras
+from defshade_cli.plan import Plan, PlannedLight
+from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.emission import Emitter, emitter_at, far_field
+from defshade_cli.scene.light import DistantLight
+from defshade_cli.scene.scene import Scene
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LitSample:
+    """One light in one sample. shadow_cameras: relative to the eye; none for a light that casts no shadow."""
+
+    planned: PlannedLight
+    emitter: Emitter
+    shadow_cameras: tuple[Camera, ...]
+
+
+def light_batches(scene: Scene, plan: Plan, sample: Sample) -> Iterator[list[LitSample]]:
+    """All of the plan's lights in order, in runs whose shadow maps fit the atlas together."""
+    extent = shadow_extent(scene.bounds - plan.camera.position, plan)
+    batch: list[LitSample] = []
+    used = 0
+    for number, planned in enumerate(plan.lights):
+        lit = _lit_sample(number, planned, plan, sample, extent)
+        if used + len(lit.shadow_cameras) > CAPACITY:
+            yield batch
+            batch, used = [], 0
+        batch.append(lit)
+        used += len(lit.shadow_cameras)
+    if batch:
+        yield batch
+
+
+def shadow_extent(bounds: NDArray[np.float64], plan: Plan) -> ShadowExtent:
+    """Casters: the (2, 3) bounds, relative to the eye. Receivers: their part of the box around the view's frustum."""
+    rotation, (left, right, bottom, top) = plan.camera.world_from_camera[:3, :3], plan.camera.window
+    scales = plan.clip if plan.camera.projection == "perspective" else (1.0, 1.0)
+    rays = np.array(list(product((left, right), (bottom, top))))
+    frustum = [np.column_stack([rays * s, np.full(4, -z)]) for s, z in zip(scales, plan.clip, strict=True)]
+    corners = np.concatenate(frustum) @ rotation.T
+    low, high = np.maximum(bounds[0], corners.min(axis=0)), np.minimum(bounds[1], corners.max(axis=0))
+    seen = np.stack([low, high]) if (low <= high).all() else bounds
+    return ShadowExtent(_corners(seen), _corners(bounds))
+
+
+def _corners(box: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.array(list(product(*box.T)))
+
+
+def _lit_sample(number: int, planned: PlannedLight, plan: Plan, sample: Sample, extent: ShadowExtent) -> LitSample:
+    light = planned.light
+    emitter = far_field(light) if plan.samples == 1 else emitter_at(light, sample.on_light(number))
+    if not (plan.shadows and light.casts_shadow):
+        return LitSample(planned, emitter, ())
+    relative = emitter.relative_to(plan.camera.position)
+    cameras = shadow_cameras(relative, light.shaping, extent, distant=isinstance(light, DistantLight))
+    return LitSample(planned, emitter, cameras)

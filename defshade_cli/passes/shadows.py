@@ -1,0 +1,185 @@
+"""Shadow maps: the scene as one sample of each light sees it, side by side in an atlas.
+
+A light that has all geometry in front of it gets one map, fitted to the geometry or to its cone; a light amid it gets
+the six faces of a cube. Maps are moved by a fraction of a texel every sample, so that their grid averages out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.records import record
+from defshade_cli.gpu.residence import SHADOW_MAPS, DrawList, RecordBuffer
+from defshade_cli.passes.view import clip_from_camera
+from defshade_cli.scene.camera import Camera, Projection
+from defshade_cli.scene.emission import Emitter
+from defshade_cli.scene.light import Shaping
+from defshade_cli.spaces import Matrix, Window, normalize, transform_points
+
+RESOLUTION = 1024
+TILES = 4
+CAPACITY = TILES * TILES
+"""Shadow maps that one atlas holds."""
+
+_WIDEST_DEGREES = 60.0
+_NO_WINDOW: Window = (-1.0, 1.0, -1.0, 1.0)
+_NEAREST = 1e-4  # near plane over far plane, where nothing else bounds it
+_FACES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], np.float64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShadowExtent:
+    """What the maps must see, as boxes of eight corners (8, 3) relative to the eye.
+
+    receivers: around what the image may show; casters: around all geometry.
+    """
+
+    receivers: NDArray[np.float64]
+    casters: NDArray[np.float64]
+
+
+def shadow_cameras(
+    emitter: Emitter, shaping: Shaping | None, extent: ShadowExtent, *, distant: bool
+) -> tuple[Camera, ...]:
+    """The maps' cameras: one, or the six of a cube in the shader's order; the emitter is relative to the eye."""
+    if distant:
+        return (_parallel(emitter.axis, extent),)
+    far = float(np.linalg.norm(extent.receivers - emitter.position, axis=1).max()) * 1.001
+    fitted = [_around_cone(emitter, shaping, far), _around_receivers(emitter.position, extent, far)]
+    cameras = [camera for camera in fitted if camera is not None]
+    return (min(cameras, key=_opening),) if cameras else _cube(emitter.position, far)
+
+
+def _parallel(axis: NDArray[np.float64], extent: ShadowExtent) -> Camera:
+    centre = extent.receivers.mean(axis=0)
+    camera_from_world = _looking(centre, axis, _NO_WINDOW, (0, 0)).camera_from_world
+    seen = transform_points(camera_from_world, extent.receivers)
+    depth = -transform_points(camera_from_world, np.concatenate([extent.receivers, extent.casters]))[:, 2]
+    margin = 4.0 / RESOLUTION * float(np.ptp(seen, axis=0).max()) + 1e-12
+    low, high = seen.min(axis=0) - margin, seen.max(axis=0) + margin
+    clip = (depth.min() - margin, depth.max() + margin)
+    return _looking(centre, axis, (low[0], high[0], low[1], high[1]), clip, "orthographic")
+
+
+def _around_cone(emitter: Emitter, shaping: Shaping | None, far: float) -> Camera | None:
+    if shaping is None or shaping.cone_angle > _WIDEST_DEGREES:
+        return None
+    side = math.tan(math.radians(max(shaping.cone_angle, 0.01))) * (1.0 + 4.0 / RESOLUTION)
+    return _looking(emitter.position, emitter.axis, (-side, side, -side, side), (_NEAREST * far, far))
+
+
+def _around_receivers(position: NDArray[np.float64], extent: ShadowExtent, far: float) -> Camera | None:
+    """A map that sees all receivers; None where that is too wide, or the position is amid them."""
+    direction = extent.receivers.mean(axis=0) - position
+    if not direction.any():
+        return None
+    camera_from_world = _looking(position, direction, _NO_WINDOW, (0, 0)).camera_from_world
+    seen = transform_points(camera_from_world, extent.receivers)
+    depth = -seen[:, 2:]
+    if depth.min() <= _NEAREST * depth.max():
+        return None
+    low, high = (seen[:, :2] / depth).min(axis=0), (seen[:, :2] / depth).max(axis=0)
+    if max(np.abs(low).max(), np.abs(high).max()) > math.tan(math.radians(_WIDEST_DEGREES)):
+        return None
+    margin = 4.0 / RESOLUTION * (high - low) + 1e-9
+    (left, bottom), (right, top) = low - margin, high + margin
+    casters = -transform_points(camera_from_world, extent.casters)[:, 2]
+    near = max(0.999 * float(min(casters.min(), depth.min())), _NEAREST * far)
+    return _looking(position, direction, (left, right, bottom, top), (near, far))
+
+
+def _cube(position: NDArray[np.float64], far: float) -> tuple[Camera, ...]:
+    side = 1.0 + 4.0 / RESOLUTION  # room for the jitter, so that the faces still meet
+    window = (-side, side, -side, side)
+    return tuple(_looking(position, face, window, (_NEAREST * far, far)) for face in _FACES)
+
+
+def _opening(camera: Camera) -> float:
+    left, right, bottom, top = camera.window
+    return (right - left) * (top - bottom)
+
+
+def _looking(
+    position: NDArray[np.float64],
+    direction: NDArray[np.float64],
+    window: Window,
+    clip: tuple[float, float],
+    projection: Projection = "perspective",
+) -> Camera:
+    back = -normalize(np.asarray(direction, np.float64))
+    right = normalize(np.cross(_FACES[2] if abs(back[1]) < 0.9 else _FACES[4], back))
+    frame: Matrix = np.eye(4)
+    frame[:3, :3] = np.column_stack([right, np.cross(back, right), back])
+    frame[:3, 3] = position
+    return Camera("<shadow>", frame, window, projection, clip)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShadowAtlas:
+    """The maps of some lights. first, count: (L,) of each light, in the order they were given."""
+
+    depth: moderngl.Texture
+    first: NDArray[np.uint32]
+    count: NDArray[np.uint32]
+
+
+class ShadowPass:
+    """Draws shadow maps into an atlas of CAPACITY tiles; what one call draws the next overwrites."""
+
+    def __init__(self, gpu: Gpu, *, cutout: bool, color_varies: bool) -> None:
+        defines = ["CUTOUT"] * cutout + ["DISPLAY_COLOR_VARIES"] * (cutout and color_varies)
+        size = (TILES * RESOLUTION, TILES * RESOLUTION)
+        self._context = gpu.context
+        self._program = gpu.shaders.program("shadow.vert", "shadow.frag", defines=defines)
+        self._depth = gpu.keep(gpu.depth_texture(size))
+        self._framebuffer = gpu.keep(gpu.context.framebuffer([], self._depth))
+        self._maps = RecordBuffer(gpu, SHADOW_MAPS)
+
+    def draw(self, draws: DrawList, cameras: Sequence[tuple[Camera, ...]], jitter: tuple[float, float]) -> ShadowAtlas:
+        """The maps of each light's cameras, at most CAPACITY in all; a light may have none. `jitter` is in texels."""
+        count = np.array([len(c) for c in cameras], np.uint32)
+        first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.uint32)
+        maps = [camera for light in cameras for camera in light]
+        assert len(maps) <= CAPACITY
+        self._framebuffer.use()
+        self._framebuffer.clear(depth=0.0)
+        self._context.enable_only(moderngl.DEPTH_TEST)
+        self._context.depth_func = ">"
+        records = np.zeros(max(len(maps), 1), record("ShadowMap"))
+        vertices = [part for part in draws.vertices if any(name in self._program for name in part[2:])]
+        array = self._context.vertex_array(self._program, vertices, draws.indices)
+        for tile, camera in enumerate(maps):
+            records[tile] = self._draw_map(array, draws, camera, tile, jitter)
+        array.release()
+        self._maps.write(records)
+        return ShadowAtlas(self._depth, first, count)
+
+    def _draw_map(
+        self, array: moderngl.VertexArray, draws: DrawList, camera: Camera, tile: int, jitter: tuple[float, float]
+    ) -> NDArray:
+        left, right, bottom, top = camera.window
+        texel = ((right - left) / RESOLUTION, (top - bottom) / RESOLUTION)
+        window = (
+            left + jitter[0] * texel[0],
+            right + jitter[0] * texel[0],
+            bottom + jitter[1] * texel[1],
+            top + jitter[1] * texel[1],
+        )
+        clip_from_light = clip_from_camera(camera, window, camera.clipping_range, standard=False)
+        matrix = (clip_from_light @ camera.camera_from_world).T.astype(np.float32)
+        column, row = tile % TILES, tile // TILES
+        self._framebuffer.viewport = (column * RESOLUTION, row * RESOLUTION, RESOLUTION, RESOLUTION)
+        self._program["clip_from_relative"] = tuple(matrix.ravel().tolist())
+        array.render_indirect(draws.commands)
+        map_record = np.zeros((), record("ShadowMap"))
+        map_record["clip_from_relative"] = matrix
+        map_record["tile"] = (column / TILES, row / TILES, 1 / TILES, 1 / TILES)
+        map_record["texel"], map_record["resolution"] = max(texel), RESOLUTION
+        return map_record

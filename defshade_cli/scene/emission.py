@@ -1,0 +1,119 @@
+"""The point that stands for a light in one sample: its far field, or a point on its surface.
+
+A surface point emits L cosθ dA. Under the light's transform M a patch with local normal n and area a becomes
+a · |cof(M) n|, so I = L · A_local · |cof(M) n| for points uniform in the shape's own coordinates; averaged over samples
+this is the integral over the true, sheared or stretched, surface. A distant light emits L over its cone of directions.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.scene.light import (
+    CylinderLight,
+    DiskLight,
+    DistantLight,
+    Light,
+    Profile,
+    RectLight,
+    SphereLight,
+)
+from defshade_cli.spaces import normalize, transform_points
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Emitter:
+    """position: (3,) world space.  axis: (3,) unit, what shaping is measured from; a distant light's direction.
+    facing: (3,) unit, what the profile is measured from.  intensity: (3,) on axis, or a distant light's irradiance.
+    """
+
+    position: Vector
+    axis: Vector
+    facing: Vector
+    profile: Profile
+    intensity: Vector
+
+    def relative_to(self, origin: Vector) -> Emitter:
+        """The same with positions counted from `origin`."""
+        return replace(self, position=self.position - origin)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Patch:
+    """A point of a light's surface in light space, its unit normal, and the area of the whole surface."""
+
+    point: Vector
+    normal: Vector
+    area: float
+
+
+def far_field(light: Light) -> Emitter:
+    """The light from afar: all of its power at its position."""
+    if isinstance(light, DistantLight):
+        return Emitter(light.position, light.axis, light.axis, "uniform", light.irradiance)
+    facing = normalize(light.world_from_light[:3, 0]) if light.profile == "sine" else light.axis
+    return Emitter(light.position, light.axis, facing, light.profile, light.intensity_on_axis)
+
+
+def emitter_at(light: Light, u: tuple[float, float]) -> Emitter:
+    """The light's point at `u` in the unit square; lights without size give their far field."""
+    if isinstance(light, DistantLight):
+        return _distant(light, u)
+    patch = _patch(light, u)
+    if patch is None or patch.area == 0.0 or light.size_factor == 0.0:
+        return far_field(light)
+    cofactor = _cofactors(light.world_from_light[:3, :3]) @ patch.normal
+    stretch = float(np.linalg.norm(cofactor))
+    intensity = light.radiance * (patch.area * stretch)
+    position = transform_points(light.world_from_light, patch.point)
+    return Emitter(position, light.axis, normalize(cofactor), "cosine", intensity)
+
+
+def _distant(light: DistantLight, u: tuple[float, float]) -> Emitter:
+    """Directions uniform in the light's cone of solid angle 2π(1 − cosθ)."""
+    half = min(max(math.radians(light.angle) / 2, 0.0), math.pi)
+    if half == 0.0:
+        return far_field(light)
+    z = 1.0 - u[0] * (1.0 - math.cos(half))
+    local = np.array([*_circle(u[1], math.sqrt(max(1.0 - z * z, 0.0))), z])
+    x = normalize(light.world_from_light[:3, 0] - light.axis * np.dot(light.axis, light.world_from_light[:3, 0]))
+    axis = normalize(np.column_stack([x, np.cross(light.axis, x), light.axis]) @ local)
+    solid_angle = 2.0 * math.pi * (1.0 - math.cos(half))
+    return Emitter(light.position, axis, axis, "uniform", light.radiance * solid_angle)
+
+
+def _patch(light: Light, u: tuple[float, float]) -> _Patch | None:
+    match light:
+        case SphereLight(treat_as_point=False, radius=r):
+            z = 1.0 - 2.0 * u[0]
+            normal = np.array([*_circle(u[1], math.sqrt(max(1.0 - z * z, 0.0))), z])
+            return _Patch(r * normal, normal, 4.0 * math.pi * r * r)
+        case DiskLight(radius=r):
+            return _Patch(np.array([*_circle(u[1], r * math.sqrt(u[0])), 0.0]), _FORWARD, math.pi * r * r)
+        case RectLight(width=w, height=h):
+            return _Patch(np.array([(u[0] - 0.5) * w, (u[1] - 0.5) * h, 0.0]), _FORWARD, w * h)
+        case CylinderLight(radius=r, length=length):
+            normal = np.array([0.0, *_circle(u[1], 1.0)])
+            return _Patch(r * normal + [(u[0] - 0.5) * length, 0.0, 0.0], normal, 2.0 * math.pi * r * length)
+    return None
+
+
+_FORWARD = np.array([0.0, 0.0, -1.0])
+
+
+def _circle(turn: float, radius: float) -> tuple[float, float]:
+    angle = 2.0 * math.pi * turn
+    return radius * math.cos(angle), radius * math.sin(angle)
+
+
+def _cofactors(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """det(M) M⁻ᵀ, with the sign that keeps outward normals outward under a mirror."""
+    x, y, z = matrix.T
+    cofactors = np.column_stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])
+    return cofactors * (-1.0 if np.dot(x, cofactors[:, 0]) < 0 else 1.0)

@@ -1,0 +1,42 @@
+#include "lib/records.glsl"
+
+#ifdef SHADOWS
+layout(std430, binding = 4) readonly buffer ShadowBlock { ShadowMap shadow_maps[]; };
+uniform sampler2D shadow_atlas;
+
+// The six maps of a light that sees all around, in the order +X −X +Y −Y +Z −Z.
+uint cube_face(vec3 direction) {
+    vec3 a = abs(direction);
+    if (a.x >= a.y && a.x >= a.z) return direction.x >= 0.0 ? 0u : 1u;
+    if (a.y >= a.z) return direction.y >= 0.0 ? 2u : 3u;
+    return direction.z >= 0.0 ? 4u : 5u;
+}
+
+// A texel lies flat: of the four around a receiver, one may have its centre √2 texels aside. Lifting the receiver along
+// its normal by √2 · texel · sinθ clears exactly that on a plane; a little towards the light clears float32 rounding.
+const float NORMAL_OFFSET = 1.5;
+const float LIGHT_OFFSET = 0.02;
+
+// Share of the light that reaches a relative position: the four nearest texels, bilinearly.
+float visibility(Light light, vec3 position, vec3 normal, vec3 l) {
+    if (light.shadow_count == 0u) return 1.0;
+    uint face = light.shadow_count == 6u ? cube_face(-l) : 0u;
+    ShadowMap map = shadow_maps[light.first_shadow + face];
+    float texel = map.texel * (map.clip_from_relative * vec4(position, 1.0)).w;
+    float sine = length(cross(normal, l));
+    vec3 lifted = position + texel * (NORMAL_OFFSET * sine * normal + LIGHT_OFFSET * l);
+    vec4 clip = map.clip_from_relative * vec4(lifted, 1.0);
+    vec3 ndc = clip.xyz / clip.w;
+    vec2 within = (0.5 + 0.5 * vec2(ndc.x, -ndc.y)) * map.resolution;
+    within = clamp(within, 0.5, map.resolution - 0.5);
+    vec4 stored = textureGather(shadow_atlas, map.tile.xy + within / map.resolution * map.tile.zw, 0);
+    vec4 lit = vec4(lessThanEqual(stored, vec4(ndc.z)));
+    vec2 t = fract(within - 0.5);
+    vec2 row = mix(lit.wx, lit.zy, t.x);
+    return mix(row.x, row.y, t.y);
+}
+#else
+float visibility(Light light, vec3 position, vec3 normal, vec3 l) {
+    return 1.0;
+}
+#endif

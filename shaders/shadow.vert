@@ -1,0 +1,30 @@
+#include "lib/records.glsl"
+
+layout(std430, binding = 1) readonly buffer InstanceBlock { Instance instances[]; };
+
+uniform mat4 clip_from_relative;
+
+in vec3 position_object;
+in uvec2 draw;                 // instance, material
+#ifdef CUTOUT
+#ifdef DISPLAY_COLOR_VARIES
+in vec4 vertex_color;
+#endif
+out float display_opacity;
+flat out uint material_index;
+flat out uint instance_index;
+#endif
+
+void main() {
+    Instance instance = instances[draw.x];
+    vec4 position = instance.relative_from_object * vec4(position_object, 1.0);
+    gl_Position = clip_from_relative * vec4(position.xyz, 1.0);
+#ifdef CUTOUT
+    instance_index = draw.x;
+    material_index = draw.y;
+    display_opacity = instance.display_opacity;
+#ifdef DISPLAY_COLOR_VARIES
+    if (vertex_color.a >= 0.0) display_opacity = vertex_color.a;
+#endif
+#endif
+}
