@@ -379,3 +379,15 @@ def test_compare_writes_the_difference(folder: Path) -> None:
     same = json.loads(succeed("compare", "d.exr", "d.exr", "--json").stdout)
     assert [layer["layer"] for layer in same["layers"]] == ["beauty", "depth"]
     assert json.loads(succeed("compare", "d.exr", "a.exr", "--json").stdout)["layers"][1]["unmatched"] > 0
+
+
+def test_the_same_in_python() -> None:
+    code = (
+        "from defshade_cli import render\n"
+        "film = render('stages/triangle.usda', size=(16, 8), layers=('beauty', 'depth'))\n"
+        "print(film.layers['depth'].shape, film.camera.path)"
+    )
+    path = str(Path(__file__).resolve().parent.parent)
+    environment = {**os.environ, "PYTHONPATH": path}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    assert done.stdout.strip() == "(8, 16, 1) /Eye"
