@@ -27,6 +27,49 @@ def read(text: str, frame: float | None = None, metadata: str = "", **options: A
     return StageReader(stage_of(text, metadata), **options).read(frame)
 
 
+def move(x: float = 0, y: float = 0, z: float = 0) -> str:
+    return f'double3 xformOp:translate = ({x}, {y}, {z})\nuniform token[] xformOpOrder = ["xformOp:translate"]'
+
+
+def instance(name: str, body: str = "", source: str = "tree") -> str:
+    """A native instance of the class `source`."""
+    return f'def Xform "{name}" (\ninstanceable = true\ninherits = </{source}>\n) {{\n{body}\n}}\n'
+
+
+TREE = f"""class Xform "tree" {{
+    def Cube "trunk" {{
+        {move(y=1)}
+    }}
+    def Xform "crown" {{
+        float3 xformOp:scale = (2, 2, 2)
+        float xformOp:rotateX = 30
+        uniform token[] xformOpOrder = ["xformOp:scale", "xformOp:rotateX"]
+        def Sphere "leaves" {{
+            {move(z=3)}
+        }}
+    }}
+}}
+"""
+
+MATERIALS = "".join(
+    f"""def Material "{name}" {{
+        token outputs:surface.connect = </{name}/s.outputs:surface>
+        def Shader "s" {{
+            uniform token info:id = "UsdPreviewSurface"
+            token outputs:surface
+        }}
+    }}
+    """
+    for name in ("wood", "paint")
+)
+
+
+def bound(body: str, material: str, strength: str = "weakerThanDescendants") -> str:
+    """`body`, a prim with metadata, with a binding on it."""
+    binding = f'rel material:binding = </{material}> (bindMaterialAs = "{strength}")'
+    return body.replace("(\n", '(\nprepend apiSchemas = ["MaterialBindingAPI"]\n', 1).replace("{", f"{{\n{binding}", 1)
+
+
 def placed(scene: Scene) -> dict[str, NDArray[np.float64]]:
     """World matrix of each instance by its path; paths that instances share take the instance's id behind a #."""
     found = {}
