@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -23,6 +24,7 @@ class Mesh:
     display_color: (V, 3) float32, scene-linear, where it varies over the mesh; else None and the drawable has it.
     display_opacity: (V,) float32 likewise.
     double_sided: as authored. Both sides are drawn either way.
+    uvs: primvar name → (V, 2) float32 texture coordinates, (0, 0) at the lower left of an image.
     """
 
     path: str
@@ -33,6 +35,7 @@ class Mesh:
     display_color: NDArray[np.float32] | None = None
     display_opacity: NDArray[np.float32] | None = None
     double_sided: bool = False
+    uvs: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         count = len(self.points)
@@ -45,6 +48,7 @@ class Mesh:
             freeze(self, "display_color", frozen(self.display_color, np.float32, count, 3))
         if self.display_opacity is not None:
             freeze(self, "display_opacity", frozen(self.display_opacity, np.float32, count))
+        freeze(self, "uvs", {name: frozen(uv, np.float32, count, 2) for name, uv in self.uvs.items()})
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
