@@ -15,15 +15,12 @@ import sys
 from collections.abc import Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
-from types import SimpleNamespace
 from unittest.mock import patch
 
 import pytest
 
 from defshade_cli import __version__
 from defshade_cli.cli import main
-from defshade_cli.cli.options import Reporting
-from defshade_cli.cli.progress import make_progress
 
 TRIANGLE = """#usda 1.0
 (
@@ -195,6 +192,19 @@ def test_file_that_is_not_usd_is_refused(folder: Path) -> None:
     assert not files(folder)
 
 
+@pytest.mark.usefixtures("package_log")
+def test_interruption_has_its_exit_code() -> None:
+    with patch("defshade_cli.render.run", side_effect=KeyboardInterrupt):
+        done = defshade_here("render", "stages/triangle.usda")
+    assert (done.returncode, done.stderr.strip()) == (130, "defshade: error: interrupted")
+
+
+@pytest.mark.usefixtures("package_log")
+def test_a_bug_keeps_its_traceback() -> None:
+    with patch("defshade_cli.render.run", side_effect=ZeroDivisionError), pytest.raises(ZeroDivisionError):
+        defshade_here("render", "stages/triangle.usda")
+
+
 def test_unknown_display_is_refused(folder: Path) -> None:
     done = defshade("render", "stages/triangle.usda", *SMALL, "-o", "out.png", "--display", "Radio")
     assert_refused(done, 2, "Radio")
@@ -273,55 +283,6 @@ def test_skip_renders_only_what_is_missing(folder: Path) -> None:
     assert files(folder) == {"f.0001.exr", "f.0002.exr"}
     assert (folder / "f.0002.exr").stat().st_mtime_ns == before
     assert "frame 2  → f.0002.exr  skipped" in done.stderr
-
-
-PROTOCOLS = {
-    "alf": ["ALF_PROGRESS 0%", "ALF_PROGRESS 33%", "ALF_PROGRESS 66%", "ALF_PROGRESS 100%"],
-    "openjd": [
-        "openjd_progress: 0.0",
-        "openjd_progress: 33.3",
-        "openjd_status: frame 1, 1 of 3",
-        "openjd_progress: 66.7",
-        "openjd_status: frame 2, 2 of 3",
-        "openjd_progress: 100.0",
-        "openjd_status: frame 3, 3 of 3",
-    ],
-    "auto": [f"frame {frame}  → f.{frame}.exr  0.75 s" for frame in (1, 2, 3)],
-    "none": [],
-}
-
-
-def _result(frame: float) -> SimpleNamespace:
-    paths = (Path(f"f.{frame:g}.exr"),)
-    return SimpleNamespace(frame=frame, paths=paths, skipped=False, seconds={"read": 0.25, "draw": 0.5})
-
-
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_progress_protocols(protocol: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with make_progress(Reporting(progress=protocol), total=3) as progress:
-        for frame in (1.0, 2.0, 3.0):
-            progress.frame(_result(frame))
-    printed = capsys.readouterr()
-    assert printed.err.splitlines() == PROTOCOLS[protocol]
-    assert not printed.out
-
-
-def test_json_progress_is_a_line_a_frame(capsys: pytest.CaptureFixture[str]) -> None:
-    with make_progress(Reporting(progress="json"), total=1) as progress:
-        progress.frame(_result(7.5))
-    events = [json.loads(line) for line in capsys.readouterr().err.splitlines()]
-    assert events == [
-        {"event": "started", "done": 0, "total": 1},
-        {"event": "frame", "done": 1, "total": 1, "frame": 7.5, "paths": ["f.7.5.exr"], "skipped": False}
-        | {"seconds": {"read": 0.25, "draw": 0.5}},
-    ]
-
-
-def test_more_frames_than_announced_is_not_more_than_all(capsys: pytest.CaptureFixture[str]) -> None:
-    with make_progress(Reporting(progress="alf"), total=1) as progress:
-        progress.frame(_result(1.0))
-        progress.frame(_result(2.0))
-    assert capsys.readouterr().err.splitlines() == ["ALF_PROGRESS 0%", "ALF_PROGRESS 100%", "ALF_PROGRESS 100%"]
 
 
 @pytest.mark.usefixtures("package_log")
