@@ -12,15 +12,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain, repeat
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd
+from pxr import Gf, Usd
 
 from defshade_cli.scene.light import Light
 from defshade_cli.usd.binding import NOTHING_BOUND, Bindings
 from defshade_cli.usd.geometry import Gprim
 from defshade_cli.usd.primvars import read_display
+from defshade_cli.usd.xform import IDENTITY
+
+
+class Standing(NamedTuple):
+    """What a prim hands down. in_world: root_from_prim leads to world space, because an xform stack was reset."""
+
+    root_from_prim: Gf.Matrix4d = IDENTITY
+    in_world: bool = False
+    purpose: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,53 +6,26 @@ reset xform stacks and instances are resolved on the way down; bindings and prim
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from pxr import Gf, Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.binding import Bindings
-from defshade_cli.usd.geometry import Gprim
-from defshade_cli.usd.instancing import Piece, Placement, place, read_display_of_instances
+from defshade_cli.usd.geometry import Gprim, is_time_varying
+from defshade_cli.usd.instancing import Piece, Standing, place
 from defshade_cli.usd.kind import Kind
 from defshade_cli.usd.light import is_light, read_light
 from defshade_cli.usd.memory import Memory
+from defshade_cli.usd.native_instances import NativeInstances
 from defshade_cli.usd.point_instancer import has_varying_copies, read_point_instancer
-from defshade_cli.usd.xform import IDENTITY, matrices, matrix
+from defshade_cli.usd.xform import matrix
 
 _PROTOTYPE_CHILDREN = Usd.PrimIsActive & Usd.PrimIsLoaded
-"""Below a PointInstancer's prototype also classes and overs, by which the schema says to hide prototypes."""
-
-
-class Standing(NamedTuple):
-    """What a prim hands down. in_world: root_from_prim leads to world space, because an xform stack was reset."""
-
-    root_from_prim: Gf.Matrix4d = IDENTITY
-    in_world: bool = False
-    purpose: str | None = None
-
-
-class Sharing(NamedTuple):
-    """What native instances have in common that are placed together."""
-
-    prototype: Sdf.Path
-    bindings: Bindings
-    in_world: bool
-    purpose: str | None
-
-
-class Instance(NamedTuple):
-    """order: among the instances of its prototype in a subtree."""
-
-    prim: Usd.Prim
-    root_from_prim: Gf.Matrix4d
-    order: int
+"""Classes and overs count below a PointInstancer's prototype: the schema recommends them to hide it elsewhere."""
 
 
 class Traversal:
@@ -75,29 +48,23 @@ class Traversal:
     def _read(
         self, roots: Iterable[Usd.Prim], above: Standing, predicate: object = Usd.PrimDefaultPredicate
     ) -> tuple[Piece, ...]:
-        """The pieces of the subtree below and with `roots`."""
+        """The pieces of the subtree that starts with `roots`."""
         pieces: list[Piece] = []
-        instances: dict[Sharing, list[Instance]] = defaultdict(list)
-        met: Counter[Sdf.Path] = Counter()
+        instances = NativeInstances(self._memory)
         stack = [(root, above) for root in reversed(list(roots))]
         while stack:
             prim, above = stack.pop()
-            kind = self._memory.kinds.of(prim)
-            here = self._stand(prim, above)
+            kind, here = self._memory.kinds.of(prim), self._stand(prim, above)
             if kind is Kind.SHADING or here is None:
                 continue
             pieces.extend(self._own_pieces(prim, kind, here))
             if kind is Kind.POINT_INSTANCER:
-                pieces.extend(self._copies(prim, here))
+                pieces.extend(self._point_instances(prim, here))
             elif prim.IsInstance():
-                prototype = prim.GetPrototype().GetPath()
-                sharing = Sharing(prototype, self._memory.bindings(prim.GetPath()), here.in_world, here.purpose)
-                instances[sharing].append(Instance(prim, here.root_from_prim, met[prototype]))
-                met[prototype] += 1
+                instances.add(prim, here)
             else:
                 stack.extend((child, here) for child in reversed(prim.GetFilteredChildren(predicate)))
-        for sharing, found in instances.items():
-            pieces.extend(self._instances(sharing, found))
+        pieces.extend(self._native_instances(instances))
         return tuple(pieces)
 
     def _stand(self, prim: Usd.Prim, above: Standing) -> Standing | None:
@@ -136,9 +103,10 @@ class Traversal:
             self._report(prim, f"prims of type {prim.GetTypeName()} are not drawn")
             return
         self.issues.update(dict.fromkeys(gprim.issues))
-        if gprim.groups:
-            bindings = tuple(self._memory.bindings(group.path) for group in gprim.groups)
-            yield self._piece(prim, here, gprim, bindings)
+        if not gprim.groups:
+            self.dormant |= is_time_varying(prim)
+            return
+        yield self._piece(prim, here, gprim, tuple(self._memory.bindings(group.path) for group in gprim.groups))
 
     def _piece(
         self, prim: Usd.Prim, here: Standing, content: Gprim | Light, bindings: tuple[Bindings, ...] = ()
@@ -157,28 +125,16 @@ class Traversal:
             here.in_world,
         )
 
-    def _instances(self, sharing: Sharing, found: list[Instance]) -> Iterator[Piece]:
-        """The copies of a native prototype."""
-        prototype, first = self._stage.GetPrimAtPath(sharing.prototype), found[0].prim
-        shown_as = self._memory.name_prototype(prototype, first)
-        displays = [self._display(instance.prim) for instance in found]
-        placement = Placement(
-            matrices([instance.root_from_prim for instance in found]),
-            np.array([instance.order for instance in found], np.int32),
-            np.concatenate([color for color, _ in displays]),
-            np.concatenate([opacity for _, opacity in displays]),
-            sharing.purpose,
-            sharing.bindings,
-            sharing.in_world,
-            prototype=shown_as,
-            roots=tuple(self._memory.shown(instance.prim.GetPath()) for instance in found),
-        )
-        if sharing.prototype not in self._prototypes:
-            self._prototypes[sharing.prototype] = self._read(prototype.GetChildren(), Standing())
-        yield from place(self._prototypes[sharing.prototype] or (), placement)
+    def _native_instances(self, instances: NativeInstances) -> Iterator[Piece]:
+        for prototype, placement in instances.placements(self._time):
+            path = prototype.GetPath()
+            if path not in self._prototypes:
+                self._prototypes[path] = self._read(prototype.GetChildren(), Standing())
+            yield from place(self._prototypes[path] or (), placement)
+        for prim, reasons in instances.issues.items():
+            self._report(prim, *reasons)
 
-    def _copies(self, prim: Usd.Prim, here: Standing) -> Iterator[Piece]:
-        """The copies that a PointInstancer makes."""
+    def _point_instances(self, prim: Usd.Prim, here: Standing) -> Iterator[Piece]:
         swarm = read_point_instancer(prim, self._time)
         self._report(prim, *swarm.issues)
         self.dormant |= not swarm.placements and has_varying_copies(prim)
@@ -207,12 +163,6 @@ class Traversal:
         if pieces is None:
             self._report(instancer, "it is part of its own prototype")
         return pieces or ()
-
-    def _display(self, prim: Usd.Prim) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        issues: list[str] = []
-        display = read_display_of_instances(prim, self._time, 1, issues)
-        self._report(prim, *issues)
-        return display
 
     def _report(self, prim: Usd.Prim, *reasons: str) -> None:
         path = self._memory.shown(prim.GetPath())
