@@ -53,8 +53,9 @@ class Mesh:
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
         """(2, 3) least and greatest corner of the drawn points, object space; NaN points do not count."""
-        used = self.points[np.unique(self.triangles)] if len(self.triangles) else self.points[:0]
-        used = used[np.isfinite(used).all(axis=1)].astype(np.float64)
+        drawn = np.zeros(len(self.points), bool)
+        drawn[self.triangles] = True
+        used = self.points[drawn & np.isfinite(self.points).all(axis=1)].astype(np.float64)
         if not len(used):
             return np.array([[np.inf] * 3, [-np.inf] * 3])
         return np.stack([used.min(axis=0), used.max(axis=0)])
