@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from defshade_cli import __version__
-from defshade_cli.errors import OutputError, UsageError
-from defshade_cli.farm.names import expand, has_frame_token
+from defshade_cli.errors import UsageError
+from defshade_cli.farm.targets import check_outputs, frame_files, frame_paths, is_done
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.image.files import check_writable, write
+from defshade_cli.image.files import write
 from defshade_cli.image.film import Film
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import Plan, make_plan
@@ -22,8 +21,6 @@ from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderJob, RenderSettings
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.stage import open_stage
-
-log = logging.getLogger("defshade")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,18 +44,19 @@ def run(job: RenderJob, *, command: str = "") -> Iterator[FrameResult]:
 
     Raises the errors of errors.py; whatever was yielded before is complete on disk.
     """
-    seconds: dict[str, float] = {}
-    with _timed(seconds, "open"):
+    startup: dict[str, float] = {}
+    with _timed(startup, "open"):
         reader = _reader(job)
     frames = job.frames or (reader.first_frame(),)
-    _check_output(job, frames)
-    with _timed(seconds, "context"):
+    check_outputs(job, frames, reader.camera_name)
+    with _timed(startup, "context"):
         gpu = Gpu(job.device)
     with gpu:
         pipeline = Pipeline(gpu)
         for frame in frames:
-            yield _render_frame(job, frame, reader, pipeline, command, seconds)
-            seconds = {}
+            result = _render_frame(job, frame, reader, pipeline, command)
+            yield replace(result, seconds=startup | result.seconds)
+            startup = {}
 
 
 def frames_of(job: RenderJob) -> tuple[float | None, ...]:
@@ -93,19 +91,12 @@ def _reader(job: RenderJob) -> StageReader:
 
 
 def _render_frame(
-    job: RenderJob,
-    frame: float | None,
-    reader: StageReader,
-    pipeline: Pipeline,
-    command: str,
-    seconds: dict[str, float],
+    job: RenderJob, frame: float | None, reader: StageReader, pipeline: Pipeline, command: str
 ) -> FrameResult:
-    targets = _targets(job, frame, reader.camera_name)
-    if existing := [path for path in targets if path.exists()]:
-        if job.output.existing == "error":
-            raise OutputError(f"{existing[0]} exists, and --existing error was asked")
-        if job.output.existing == "skip" and len(existing) == len(targets):
-            return FrameResult(frame, targets, skipped=True, seconds=seconds)
+    files = frame_files(job, frame, reader.camera_name)
+    if is_done(job, files):
+        return FrameResult(frame, files, skipped=True)
+    seconds: dict[str, float] = {}
     with _timed(seconds, "read"):
         scene = reader.read(frame)
     with _timed(seconds, "plan"):
@@ -114,22 +105,9 @@ def _render_frame(
         film = pipeline.render(scene, plan)
     film = replace(film, metadata=_provenance(job, plan, command, seconds["draw"]))
     with _timed(seconds, "write"):
-        paths = tuple(path for target in targets for path in write(film, job.output, target))
-    return FrameResult(frame, paths, film=film, plan=plan, seconds=seconds)
-
-
-def _targets(job: RenderJob, frame: float | None, camera: str) -> tuple[Path, ...]:
-    patterns = job.output.patterns
-    return tuple(expand(pattern, frame=frame, scene=job.stage.stem, camera=camera) for pattern in patterns)
-
-
-def _check_output(job: RenderJob, frames: tuple[float | None, ...]) -> None:
-    """Say before the first frame what would go wrong after it."""
-    for pattern in job.output.patterns:
-        if len(frames) > 1 and not has_frame_token(pattern):
-            raise UsageError(f"{len(frames)} frames would overwrite each other in {pattern}; put #### in its name")
-    for path in _targets(job, frames[0], "camera"):
-        check_writable(path)
+        paths = frame_paths(job, frame, reader.camera_name)
+        written = tuple(file for path in paths for file in write(film, job.output, path))
+    return FrameResult(frame, written, film=film, plan=plan, seconds=seconds)
 
 
 def _provenance(job: RenderJob, plan: Plan, command: str, seconds: float) -> dict[str, Any]:
