@@ -89,3 +89,12 @@ def test_links_lead_somewhere(page: Path) -> None:
         path = (page.parent / target).resolve() if target else page
         assert path.exists(), f"{page.name} links to {link}, which is not there"
         assert not anchor or anchor in _anchors(path), f"{page.name} links to {link}: no such heading"
+
+
+@pytest.mark.parametrize("page", ["CONTRIBUTING.md", "docs/architecture.md", "docs/conventions.md"])
+def test_named_files_exist(page: str) -> None:
+    """Every path in a code span; those with a placeholder stand for many."""
+    spans = re.findall(r"`([\w./-]+/[\w.-]*|[\w-]+\.(?:py|md|toml|glsl))`", (ROOT / page).read_text(encoding="utf-8"))
+    homes = (ROOT, ROOT / "defshade_cli", ROOT / "docs")
+    missing = [span for span in spans if not any((home / span).exists() for home in homes)]
+    assert not missing, f"{page} names files that are not there: {', '.join(missing)}"

@@ -147,6 +147,16 @@ def test_a_scene_far_from_the_origin_renders_like_one_at_the_origin(pipeline: Pi
     np.testing.assert_array_equal(films[0].layers["beauty"], films[1].layers["beauty"])
 
 
+def test_a_frame_without_anything_to_draw_is_empty(pipeline: Pipeline) -> None:
+    """All is hidden for now: the layers are their backgrounds, and the frame after is drawn again."""
+    empty = scene([], [sun()], [PLASTIC])
+    settings = RenderSettings(size=(16, 16), layers=("beauty", "depth", "normal"))
+    layers = pipeline.render(empty, make_plan(empty, settings)).layers
+    assert not layers["beauty"].any() and not layers["normal"].any() and np.isinf(layers["depth"]).all()
+    full = scene([quad(5.0)], [sun()], [PLASTIC])
+    assert pipeline.render(full, make_plan(full, settings)).layers["beauty"].all()
+
+
 def test_subsets_draw_their_own_triangles(pipeline: Pipeline) -> None:
     from defshade_cli.scene.geometry import Subset
 

@@ -222,3 +222,11 @@ def test_an_instancer_without_copies_for_now_is_no_empty_stage() -> None:
         point3f[] positions.timeSamples = { 0: [], 1: [(0, 0, 0)] }"""
     reader = StageReader(stage_of(instancer(arrays)))
     assert [len(reader.read(frame).drawables) for frame in (0, 1)] == [0, 1]
+
+
+def test_velocities_without_a_rate_are_reported() -> None:
+    arrays = """int[] protoIndices = [0]
+        point3f[] positions.timeSamples = { 0: [(0, 0, 0)], 24: [(100, 0, 0)] }
+        vector3f[] velocities.timeSamples = { 0: [(0, 12, 0)], 24: [(0, 0, 0)] }"""
+    scene = read('def Sphere "s" {\n}\n' + instancer(arrays), 12.0, "timeCodesPerSecond = 0")
+    assert reasons(scene, "/swarm") == ["1 instances have a transform that is not finite"]

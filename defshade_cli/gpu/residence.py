@@ -91,6 +91,8 @@ class GpuScene:
 
 def instance_records(drawables: Sequence[Drawable], eye: NDArray[np.float64]) -> NDArray:
     """One Instance record a placement, in the drawables' order; differences taken in float64."""
+    if not drawables:
+        return np.zeros(0, record("Instance"))
     matrices = np.concatenate([d.world_from_object for d in drawables])
     records = np.zeros(len(matrices), record("Instance"))
     relative = matrices.copy()
@@ -147,6 +149,8 @@ def _same(old: tuple[Mesh, ...], new: tuple[Mesh, ...]) -> bool:
 
 
 def _vertex_arrays(meshes: Sequence[Mesh], color_varies: bool) -> list[NDArray]:
+    if not meshes:
+        return [np.empty((0, 3), np.float32), np.empty((0, 3), np.float32), np.empty((0, 3), np.uint32)]
     arrays = [
         np.concatenate([m.points for m in meshes]),
         np.concatenate([m.normals for m in meshes]),

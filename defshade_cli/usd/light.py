@@ -70,10 +70,9 @@ def _common(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any]:
     if _input(prim, "enableColorTemperature", time):
         color = color * temperature_color(_input(prim, "colorTemperature", time))
     casts_shadow = _input(prim, "shadow:enable", time) if prim.HasAPI(UsdLux.ShadowAPI) else True
-    names = ("intensity", "exposure", "normalize", "diffuse", "specular")
+    values = {name: _input(prim, name, time) for name in ("intensity", "exposure", "normalize", "diffuse", "specular")}
     shaping = _shaping(prim, time) if prim.HasAPI(UsdLux.ShapingAPI) else None
-    inputs = {name: _input(prim, name, time) for name in names}
-    return {"color": color, "shaping": shaping, "casts_shadow": casts_shadow} | inputs
+    return {"color": color, "shaping": shaping, "casts_shadow": casts_shadow} | values
 
 
 def _shaping(prim: Usd.Prim, time: Usd.TimeCode) -> Shaping:

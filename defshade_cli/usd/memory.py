@@ -22,7 +22,8 @@ class Memory:
         self.kinds = Kinds()
         self.xforms = UsdGeom.XformCache()
         self._stage = stage
-        self._gprims: dict[Sdf.Path, Gprim | None] = {}
+        self._gprims: dict[Sdf.Path, tuple[Usd.TimeCode, Gprim | None]] = {}
+        self._time_varying: dict[Sdf.Path, bool] = {}
         self._bindings: dict[Sdf.Path, Bindings] = {}
         self._materials: dict[Sdf.Path, ReadMaterial] = {}
         self._first_instances: dict[str, str] = {}
@@ -31,14 +32,11 @@ class Memory:
         """The same object at every time, unless something of the prim varies."""
         path = prim.GetPath()
         if path in self._gprims:
-            return self._gprims[path]
-        gprim = read_gprim(prim, time)
-        if gprim is not None:
-            mesh = replace(gprim.mesh, path=self.shown(path))
-            issues = tuple(replace(issue, path=self.shown(issue.path)) for issue in gprim.issues)
-            gprim = replace(gprim, mesh=mesh, issues=issues)
-        if gprim is None or not is_time_varying(prim):
-            self._gprims[path] = gprim
+            time_read, gprim = self._gprims[path]
+            if time == time_read or not self._is_time_varying(prim):
+                return gprim
+        gprim = self._as_shown(read_gprim(prim, time), path)
+        self._gprims[path] = time, gprim
         return gprim
 
     def material(self, path: Sdf.Path, time: Usd.TimeCode) -> ReadMaterial:
@@ -64,3 +62,17 @@ class Memory:
     def name_prototype(self, prototype: Usd.Prim, instance: Usd.Prim) -> str:
         """Show what stands in `prototype` as part of `instance`, or of the instance that came first."""
         return self._first_instances.setdefault(prototype.GetName(), self.shown(instance.GetPath()))
+
+    def _is_time_varying(self, prim: Usd.Prim) -> bool:
+        """Asked only when a second frame is read."""
+        path = prim.GetPath()
+        if path not in self._time_varying:
+            self._time_varying[path] = is_time_varying(prim)
+        return self._time_varying[path]
+
+    def _as_shown(self, gprim: Gprim | None, path: Sdf.Path) -> Gprim | None:
+        shown = self.shown(path)
+        if gprim is None or shown == gprim.mesh.path:
+            return gprim
+        issues = tuple(replace(issue, path=self.shown(issue.path)) for issue in gprim.issues)
+        return replace(gprim, mesh=replace(gprim.mesh, path=shown), issues=issues)
