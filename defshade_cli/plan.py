@@ -12,6 +12,7 @@ further than the geometry does.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 from typing import Literal
@@ -78,7 +79,6 @@ class Plan:
     shadows: bool
     cutout: bool
     data_pass: bool
-    decisions: tuple[Decision, ...]
 
     @property
     def lit(self) -> bool:
@@ -92,8 +92,16 @@ class Plan:
 
     @property
     def passes(self) -> tuple[str, ...]:
-        lighting = ("gbuffer", "emission", *(f"light {volume}" for volume in self.volumes), "accumulation")
-        return (lighting if self.lit else ()) + (("data gbuffer",) if self.data_pass or not self.lit else ())
+        """Names of the passes in the order of the pipeline."""
+        lighting = ("gbuffer", "emission", *("shadow maps",) * self.shadows, *(f"light {v}" for v in self.volumes))
+        accumulation = ("accumulation",) * (self.samples > 1)
+        data = ("data gbuffer",) * (self.data_pass or not self.lit)
+        return (lighting + accumulation if self.lit else ()) + data
+
+    @property
+    def decisions(self) -> tuple[Decision, ...]:
+        """What was kept and what skipped, each with its reason."""
+        return tuple(_explain(self))
 
 
 def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
@@ -105,6 +113,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     lights = _plan_lights(scene, exposure, settings)
     planes = needed_planes(scene.materials, settings.layers)
     cutout = _has_cutout(scene)
+    shadows = settings.shadows and bool(scene.drawables) and any(p.light.casts_shadow for p in lights)
     data_layers = [name for name in settings.layers if LAYERS[name].source != "lighting"]
     data_pass = bool(data_layers) and (settings.layout != "float" or settings.samples > 1 or cutout)
     return Plan(
@@ -118,10 +127,9 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         layers=settings.layers,
         planes=planes,
         lights=lights,
-        shadows=_casts_shadows(settings, lights),
+        shadows=shadows,
         cutout=cutout,
         data_pass=data_pass,
-        decisions=_explain(settings, planes, lights, cutout, data_layers, data_pass),
     )
 
 
@@ -147,10 +155,6 @@ def _has_cutout(scene: Scene) -> bool:
     varying = [m.display_opacity for m in scene.meshes if m.display_opacity is not None]
     constant = [d.display_opacity for d in scene.drawables]
     return any(m.uses_display_color for m in scene.materials) and any((o < 1.0).any() for o in varying + constant)
-
-
-def _casts_shadows(settings: RenderSettings, lights: tuple[PlannedLight, ...]) -> bool:
-    return settings.shadows and any(planned.light.casts_shadow for planned in lights)
 
 
 def _tight_clip(camera: Camera, bounds: NDArray[np.float64]) -> tuple[float, float]:
@@ -197,33 +201,21 @@ def _reach(light: Light, bounds: NDArray[np.float64], gain: float) -> float:
     return min(math.sqrt(_peak(light) * gain), geometry)
 
 
-def _explain(
-    settings: RenderSettings,
-    planes: tuple[Plane, ...],
-    lights: tuple[PlannedLight, ...],
-    cutout: bool,
-    data_layers: list[str],
-    data_pass: bool,
-) -> tuple[Decision, ...]:
-    decisions = [Decision("layout", settings.layout, "as asked")]
+def _explain(plan: Plan) -> Iterator[Decision]:
+    yield Decision("layout", plan.layout, "as asked")
     for plane in PLANES:
-        kept = plane in planes
-        reason = "a material or layer needs it" if kept else "no material and no layer needs it"
-        decisions.append(Decision(f"plane {plane.name}", "kept" if kept else "skipped", reason))
+        yield _kept(f"plane {plane.name}", plane in plan.planes, "a material or layer needs it", "nothing needs it")
     for volume in ("quad", "sphere", "cone"):
-        count = sum(p.volume == volume for p in lights)
-        choice = f"{count} drawn" if count else "skipped"
-        decisions.append(
-            Decision(f"{volume} volumes", choice, "lights that reach geometry" if count else "no such light")
-        )
-    decisions.append(
-        Decision("cutout", "kept" if cutout else "skipped", f"{'some' if cutout else 'no'} opacity is below 1")
-    )
-    if data_layers:
-        reason = (
-            "the beauty's GBuffer is jittered, quantised or dithered" if data_pass else "one float sample serves both"
-        )
-        decisions.append(Decision("data GBuffer", "kept" if data_pass else "shared", reason))
-    if "beauty" not in settings.layers:
-        decisions.append(Decision("lighting", "skipped", "no layer needs it"))
-    return tuple(decisions)
+        count = sum(planned.volume == volume for planned in plan.lights)
+        yield Decision(f"{volume} volumes", f"{count} drawn" if count else "skipped", "lights that reach geometry")
+    yield _kept("shadow maps", plan.shadows, "a light casts them", "no light casts any, or none were asked")
+    yield _kept("cutout", plan.cutout, "some opacity is below 1", "no opacity is below 1")
+    if any(LAYERS[name].source != "lighting" for name in plan.layers):
+        jittered, shared = "the beauty's is jittered, quantised or dithered", "the beauty's own float sample serves"
+        yield _kept("data GBuffer", plan.data_pass or not plan.lit, jittered if plan.lit else "as asked", shared)
+    if not plan.lit:
+        yield Decision("lighting", "skipped", "no layer needs it")
+
+
+def _kept(subject: str, kept: bool, why: str, why_not: str) -> Decision:
+    return Decision(subject, "kept" if kept else "skipped", why if kept else why_not)

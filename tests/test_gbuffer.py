@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from build import camera, drawable, quad, rotated, scene, sphere, sun
+from build import bulb, camera, drawable, quad, rotated, scene, sphere, sun
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
@@ -149,7 +149,7 @@ def test_a_scene_far_from_the_origin_renders_like_one_at_the_origin(pipeline: Pi
 
 def test_a_frame_without_anything_to_draw_is_empty(pipeline: Pipeline) -> None:
     """All is hidden for now: the layers are their backgrounds, and the frame after is drawn again."""
-    empty = scene([], [sun()], [PLASTIC])
+    empty = scene([], [sun(), bulb(0, 0, 2)], [PLASTIC])
     settings = RenderSettings(size=(16, 16), layers=("beauty", "depth", "normal"))
     layers = pipeline.render(empty, make_plan(empty, settings)).layers
     assert not layers["beauty"].any() and not layers["normal"].any() and np.isinf(layers["depth"]).all()

@@ -63,7 +63,7 @@ class GpuScene:
         self._gpu = gpu
         self._instances = RecordBuffer(gpu, INSTANCES)
         self._materials = RecordBuffer(gpu, MATERIALS)
-        self._meshes: tuple[Mesh, ...] = ()
+        self._meshes: tuple[Mesh, ...] | None = None
         self._pool: list[moderngl.Buffer] = []
         self._draws: list[moderngl.Buffer] = []
 
@@ -72,7 +72,7 @@ class GpuScene:
         self._instances.write(instance_records(scene.drawables, scene.camera.position))
         self._materials.write(material_records(scene.materials))
         color_varies = any(m.display_color is not None or m.display_opacity is not None for m in scene.meshes)
-        if not _same(self._meshes, scene.meshes):
+        if self._meshes is None or not _same(self._meshes, scene.meshes):
             self._pool = self._replaced(self._pool, _vertex_arrays(scene.meshes, color_varies))
             self._meshes = scene.meshes
         commands, rows = draw_commands(scene.drawables, scene.meshes)
