@@ -1,0 +1,236 @@
+"""A Scene's direct lighting by Mitsuba 3, path traced: the ground truth that accumulated samples converge to.
+
+Emitters carry a null BSDF and are hidden: like ours, lights neither show nor block. A distant light of some angle is a
+disk far away. `volpath` with two segments a path is direct lighting that sees through null surfaces.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.errors import DefshadeError
+from defshade_cli.measure.mitsuba_plugins import mi
+from defshade_cli.plan import Plan
+from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.geometry import Drawable, Mesh
+from defshade_cli.scene.light import CylinderLight, DiskLight, DistantLight, Light, RectLight, SphereLight
+from defshade_cli.scene.material import Material
+from defshade_cli.scene.scene import Scene
+from defshade_cli.spaces import Matrix, normalize, transform_points
+
+_CHUNK = 64  # samples that Mitsuba holds in memory at a time
+_FAR = 1e4  # distance of a distant light's disk over the scene's radius
+_TURNED = np.diag([1.0, -1.0, -1.0, 1.0])  # Mitsuba's flat shapes face +Z, USD's lights −Z
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reference:
+    """radiance: (H, W, 3) times exposure, the mean of two independent halves.
+
+    halves: (2, H, W, 3); half of their difference is the noise of the mean.
+    """
+
+    halves: NDArray[np.float32]
+
+    @property
+    def radiance(self) -> NDArray[np.float32]:
+        return self.halves.mean(axis=0)
+
+
+def path_traced(scene: Scene, plan: Plan, samples: int) -> Reference:
+    """Render with `samples` a pixel. Raises DefshadeError for what the conversion does not know."""
+    world = mi.load_dict(_world(scene, plan))
+    chunks = max(1, math.ceil(samples / 2 / _CHUNK))
+    halves = [_mean(world, range(half * chunks, (half + 1) * chunks)) for half in (0, 1)]
+    return Reference(np.stack(halves) * np.float32(plan.exposure))
+
+
+def _mean(world: Any, seeds: range) -> NDArray[np.float32]:
+    total = np.zeros((), np.float64)
+    for seed in seeds:
+        total = total + np.array(mi.render(world, spp=_CHUNK, seed=seed), np.float64)[..., :3]
+    return (total / len(seeds)).astype(np.float32)
+
+
+def _world(scene: Scene, plan: Plan) -> dict[str, Any]:
+    integrator = {"type": "volpath", "max_depth": 2, "hide_emitters": True}
+    world: dict[str, Any] = {"type": "scene", "integrator": integrator, "sensor": _sensor(plan)}
+    for number, (material, part) in enumerate(_parts(scene)):
+        world[f"part{number}"] = _mesh(f"part{number}", part, material)
+    low, high = scene.bounds
+    ball = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+    return world | {f"light{number}": _emitter(light, *ball) for number, light in enumerate(scene.lights)}
+
+
+def _sensor(plan: Plan) -> dict[str, Any]:
+    camera = plan.camera
+    left, right, bottom, top = camera.window
+    if camera.projection != "perspective":
+        raise DefshadeError(f"{camera.path}: path tracing takes perspective cameras only")
+    film = {"type": "hdrfilm", "width": plan.size[0], "height": plan.size[1], "rfilter": {"type": "box"}}
+    return {
+        "type": "perspective",
+        "fov_axis": "x",
+        "fov": math.degrees(2.0 * math.atan((right - left) / 2.0)),
+        "principal_point_offset_x": -(left + right) / 2.0 / (right - left),
+        "principal_point_offset_y": (bottom + top) / 2.0 / (top - bottom),
+        "near_clip": plan.clip[0],
+        "far_clip": plan.clip[1],
+        "to_world": _transform(camera.world_from_camera @ np.diag([-1.0, 1.0, -1.0, 1.0])),
+        "film": film | {"component_format": "float32", "pixel_format": "rgb"},
+        "sampler": {"type": "independent"},
+    } | _lens(camera)
+
+
+def _lens(camera: Camera) -> dict[str, Any]:
+    if camera.f_stop <= 0.0 or camera.focus_distance <= 0.0:
+        return {}
+    radius = 0.5 * camera.focal_length / camera.f_stop
+    return {"type": "thinlens", "aperture_radius": radius, "focus_distance": camera.focus_distance}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """World-space (V, 3) points and normals, (T, 3) triangles that wind around their outside."""
+
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+
+
+def _parts(scene: Scene) -> Iterator[tuple[Material, _Part]]:
+    for drawable in scene.drawables:
+        for row, world_from_object in enumerate(drawable.world_from_object):
+            whole = _placed(scene.meshes[drawable.mesh], world_from_object)
+            for subset in drawable.subsets:
+                triangles = whole.triangles[subset.first : subset.first + subset.count]
+                material = _shown(scene.materials[subset.material], drawable, row)
+                yield material, replace(whole, triangles=triangles)
+
+
+def _placed(mesh: Mesh, world_from_object: Matrix) -> _Part:
+    linear = world_from_object[:3, :3]
+    mirrored = np.linalg.det(linear) < 0.0
+    triangles = mesh.triangles[:, ::-1] if mirrored else mesh.triangles
+    normals = normalize(mesh.normals @ np.linalg.inv(linear))
+    return _Part(transform_points(world_from_object, mesh.points), normals, triangles)
+
+
+def _shown(material: Material, drawable: Drawable, row: int) -> Material:
+    if material.opacity < 1.0:
+        raise DefshadeError(f"{material.path}: path tracing takes opaque materials only")
+    if not material.uses_display_color:
+        return material
+    return replace(material, diffuse_color=tuple(drawable.display_color[row].tolist()))
+
+
+def _mesh(name: str, part: _Part, material: Material) -> Any:
+    props = mi.Properties()
+    props["bsdf"] = mi.load_dict(_bsdf(material))
+    mesh = mi.Mesh(name, len(part.points), len(part.triangles), props, has_vertex_normals=True)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = part.points.astype(np.float32).ravel()
+    parameters["vertex_normals"] = part.normals.astype(np.float32).ravel()
+    parameters["faces"] = part.triangles.astype(np.uint32).ravel()
+    parameters.update()
+    return mesh
+
+
+def _bsdf(material: Material) -> dict[str, Any]:
+    base, metallic = np.array(material.diffuse_color), material.metallic
+    if material.use_specular_workflow:
+        metallic, f0, f90 = 0.0, np.array(material.specular_color), np.ones(3)
+    else:
+        f90 = 1.0 + (base - 1.0) * metallic
+        dielectric = ((1.0 - material.ior) / (1.0 + material.ior)) ** 2 * f90
+        f0 = dielectric + (f90 - dielectric) * metallic
+    scalars = ("roughness", "clearcoat", "clearcoat_roughness")
+    return {
+        "type": "preview_surface",
+        "base": _vector(base),
+        "f0": _vector(f0),
+        "f90": _vector(f90),
+        "metallic": float(metallic),
+    } | {name: float(getattr(material, name)) for name in scalars}
+
+
+def _emitter(light: Light, centre: NDArray[np.float64], radius: float) -> dict[str, Any]:
+    if isinstance(light, DistantLight):
+        return _distant(light, centre, radius)
+    if light.size_factor == 0.0 or (isinstance(light, SphereLight) and light.treat_as_point):
+        if light.shaping or light.profile != "uniform":
+            raise DefshadeError(f"{light.path}: path tracing takes no shaped light without a size")
+        return {"type": "point", "position": light.position.tolist(), "intensity": _rgb(light.intensity_on_axis)}
+    return _shape(light) | {"bsdf": {"type": "null"}, "emitter": _area(light)}
+
+
+def _distant(light: DistantLight, centre: NDArray[np.float64], radius: float) -> dict[str, Any]:
+    half = math.radians(light.angle) / 2.0
+    if half == 0.0:
+        return {"type": "directional", "direction": light.axis.tolist(), "irradiance": _rgb(light.irradiance)}
+    if half > math.radians(80.0):
+        raise DefshadeError(f"{light.path}: path tracing takes distant lights up to 160 degrees")
+    frame = light.world_from_light.copy()
+    frame[:3, :3] /= np.linalg.norm(frame[:3, :3], axis=0)
+    frame[:3, 3] = centre - light.axis * (_FAR * radius)
+    spread = _FAR * radius * math.tan(half)
+    to_world = _transform(frame @ _TURNED @ np.diag([spread, spread, 1.0, 1.0]))
+    emitter = {"type": "area", "radiance": _rgb(light.radiance)}
+    return {"type": "disk", "to_world": to_world, "bsdf": {"type": "null"}, "emitter": emitter}
+
+
+def _shape(light: Light) -> dict[str, Any]:
+    """The light's surface; spheres and cylinders must not be stretched."""
+    match light:
+        case SphereLight(radius=r):
+            return {"type": "sphere", "center": light.position.tolist(), "radius": r * _scale(light)}
+        case CylinderLight(radius=r, length=length):
+            ends = transform_points(light.world_from_light, np.array([[-length / 2, 0, 0], [length / 2, 0, 0]]))
+            return {"type": "cylinder", "p0": ends[0].tolist(), "p1": ends[1].tolist(), "radius": r * _scale(light)}
+        case DiskLight(radius=r):
+            kind, sides = "disk", (r, r)
+        case RectLight(width=width, height=height):
+            kind, sides = "rectangle", (width / 2, height / 2)
+        case _:
+            raise DefshadeError(f"{light.path}: path tracing knows no {light.kind} light")
+    return {"type": kind, "to_world": _transform(light.world_from_light @ _TURNED @ np.diag([*sides, 1.0, 1.0]))}
+
+
+def _scale(light: Light) -> float:
+    scales = np.linalg.norm(light.world_from_light[:3, :3], axis=0)
+    if np.ptp(scales) > 1e-4 * scales.max():
+        raise DefshadeError(f"{light.path}: path tracing takes no stretched {light.kind} light")
+    return float(scales.mean())
+
+
+def _area(light: Light) -> dict[str, Any]:
+    if light.shaping is None:
+        return {"type": "area", "radiance": _rgb(light.radiance)}
+    shaping, outer = light.shaping, math.radians(light.shaping.cone_angle)
+    return {
+        "type": "shaped_area",
+        "radiance": _vector(light.radiance),
+        "axis": _vector(light.axis),
+        "cone_angle": outer,
+        "cone_smooth_start": outer * (1.0 - min(max(shaping.cone_softness, 0.0), 1.0)),
+        "focus": max(shaping.focus, 0.0),
+        "focus_tint": _vector(np.array(shaping.focus_tint)),
+    }
+
+
+def _rgb(color: NDArray[np.float64]) -> dict[str, Any]:
+    return {"type": "rgb", "value": color.tolist()}
+
+
+def _vector(values: NDArray[np.float64]) -> Any:
+    return mi.ScalarVector3f(*values.tolist())
+
+
+def _transform(matrix: Matrix) -> Any:
+    return mi.ScalarTransform4f(matrix)
