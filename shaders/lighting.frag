@@ -4,6 +4,12 @@
 #include "lib/shadow.glsl"
 #include "generated/planes.glsl"
 
+// A lobe that is wider by the patch of light that one point stands for.
+float widened_roughness(float roughness, float alpha_squared) {
+    float alpha = GGX_alpha(roughness);
+    return sqrt(min(sqrt(alpha * alpha + alpha_squared), 1.0));
+}
+
 flat in uint light_index;
 out vec4 radiance;
 
@@ -17,6 +23,11 @@ void main() {
     if (irradiance == vec3(0.0)) discard;
     Surface surface = read_planes(pixel);
     irradiance *= visibility(lights[light_index], position, surface.normal, l);
+    float widening = patch_alpha_squared(lights[light_index], position, l);
+    if (widening > 0.0) {
+        surface.roughness = widened_roughness(surface.roughness, widening);
+        surface.clearcoat_roughness = widened_roughness(surface.clearcoat_roughness, widening);
+    }
     vec3 f = evaluate_brdf(surface, direction_to_eye(position), l, lights[light_index].response);
     radiance = vec4(view.exposure * irradiance * f, 0.0);
 }

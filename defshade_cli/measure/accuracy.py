@@ -28,7 +28,7 @@ from defshade_cli.settings import RenderSettings
 SIZE = (320, 180)
 SAMPLES = (1, 4, 16, 64, 256)
 SHOWN = (1, 16, 256)
-REFERENCE_SAMPLES = 1024
+REFERENCE_SAMPLES = 512
 STAGES = Path("accuracy")
 CACHE = Path("build/accuracy")
 _CHARTS = ("materials", "light_many")

@@ -84,7 +84,7 @@ def _sensor(plan: Plan) -> dict[str, Any]:
         "far_clip": plan.clip[1],
         "to_world": _transform(camera.world_from_camera @ np.diag([-1.0, 1.0, -1.0, 1.0])),
         "film": film | {"component_format": "float32", "pixel_format": "rgb"},
-        "sampler": {"type": "independent"},
+        "sampler": {"type": "multijitter", "sample_count": _CHUNK},
     } | _lens(camera)
 
 

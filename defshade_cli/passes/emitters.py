@@ -61,7 +61,8 @@ def _corners(box: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _lit_sample(number: int, planned: PlannedLight, plan: Plan, sample: Sample, extent: ShadowExtent) -> LitSample:
     light = planned.light
-    emitter = far_field(light) if plan.samples == 1 else emitter_at(light, sample.on_light(number))
+    sampled = plan.samples > 1
+    emitter = emitter_at(light, sample.on_light(number)).shared_by(plan.samples) if sampled else far_field(light)
     if not (plan.shadows and light.casts_shadow):
         return LitSample(planned, emitter, ())
     relative = emitter.relative_to(plan.camera.position)

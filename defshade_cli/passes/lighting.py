@@ -124,7 +124,8 @@ def light_records(
         row["position"], row["axis"], row["facing"] = emitter.position - eye, emitter.axis, emitter.facing
         row["profile"], row["intensity"] = _PROFILES.index(emitter.profile), emitter.intensity
         row["response"] = (planned.light.diffuse, planned.light.specular)
-        row["reach"] = planned.reach
+        aside = float(np.linalg.norm(emitter.position - planned.light.position))
+        row["reach"], row["extent"] = planned.reach + aside, emitter.extent
         _set_shaping(row, planned.light.shaping)
     if shadows:
         records["first_shadow"], records["shadow_count"] = shadows.first, shadows.count

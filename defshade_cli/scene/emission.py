@@ -31,6 +31,7 @@ Vector = NDArray[np.float64]
 class Emitter:
     """position: (3,) world space.  axis: (3,) unit, what shaping is measured from; a distant light's direction.
     facing: (3,) unit, what the profile is measured from.  intensity: (3,) on axis, or a distant light's irradiance.
+    extent: world-space area that the point stands for, a distant light's solid angle in steradians; 0 for a point.
     """
 
     position: Vector
@@ -38,6 +39,11 @@ class Emitter:
     facing: Vector
     profile: Profile
     intensity: Vector
+    extent: float = 0.0
+
+    def shared_by(self, samples: int) -> Emitter:
+        """One of `samples` points that stand for the light together."""
+        return replace(self, extent=self.extent / samples)
 
     def relative_to(self, origin: Vector) -> Emitter:
         """The same with positions counted from `origin`."""
@@ -72,7 +78,7 @@ def emitter_at(light: Light, u: tuple[float, float]) -> Emitter:
     stretch = float(np.linalg.norm(cofactor))
     intensity = light.radiance * (patch.area * stretch)
     position = transform_points(light.world_from_light, patch.point)
-    return Emitter(position, light.axis, normalize(cofactor), "cosine", intensity)
+    return Emitter(position, light.axis, normalize(cofactor), "cosine", intensity, patch.area * stretch)
 
 
 def _distant(light: DistantLight, u: tuple[float, float]) -> Emitter:
@@ -85,7 +91,7 @@ def _distant(light: DistantLight, u: tuple[float, float]) -> Emitter:
     x = normalize(light.world_from_light[:3, 0] - light.axis * np.dot(light.axis, light.world_from_light[:3, 0]))
     axis = normalize(np.column_stack([x, np.cross(light.axis, x), light.axis]) @ local)
     solid_angle = 2.0 * math.pi * (1.0 - math.cos(half))
-    return Emitter(light.position, axis, axis, "uniform", light.radiance * solid_angle)
+    return Emitter(light.position, axis, axis, "uniform", light.radiance * solid_angle, solid_angle)
 
 
 def _patch(light: Light, u: tuple[float, float]) -> _Patch | None:

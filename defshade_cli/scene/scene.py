@@ -52,12 +52,18 @@ class Scene:
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
         """(2, 3) world-space box around every drawable; (+inf, −inf) for a scene without geometry."""
-        corners = [self._world_corners(drawable) for drawable in self.drawables]
-        corners = [c[np.isfinite(c).all(axis=1)] for c in corners]
-        corners = [c for c in corners if len(c)]
-        if not corners:
-            return np.array([[np.inf] * 3, [-np.inf] * 3])
-        return np.stack([np.min([c.min(0) for c in corners], 0), np.max([c.max(0) for c in corners], 0)])
+        low, high = self.drawable_bounds[:, 0], self.drawable_bounds[:, 1]
+        return np.stack([low.min(axis=0, initial=np.inf), high.max(axis=0, initial=-np.inf)])
+
+    @cached_property
+    def drawable_bounds(self) -> NDArray[np.float64]:
+        """(D, 2, 3) world-space box around all placements of each drawable; (+inf, −inf) around none."""
+        boxes = np.empty((len(self.drawables), 2, 3))
+        for box, drawable in zip(boxes, self.drawables, strict=True):
+            corners = self._world_corners(drawable)
+            corners = corners[np.isfinite(corners).all(axis=1)]
+            box[0], box[1] = corners.min(axis=0, initial=np.inf), corners.max(axis=0, initial=-np.inf)
+        return boxes
 
     def _world_corners(self, drawable: Drawable) -> NDArray[np.float64]:
         box = np.array(list(product(*self.meshes[drawable.mesh].bounds.T)))
