@@ -205,6 +205,14 @@ def _image_options(layers: Sequence[str]) -> list[Function]:
             help="Encoding of the GBuffer that lighting reads; data layers are always read as float.",
         ),
         option(
+            "--complexity",
+            type=click.Choice(settings.COMPLEXITIES),
+            default=_RENDER.complexity,
+            default_text=str(_RENDER.complexity),
+            help="Refinement of subdivision surfaces: auto goes by their size in the image; low draws their cages, "
+            "medium, high and veryhigh one, two and three levels.",
+        ),
+        option(
             "--exposure",
             type=Finite(),
             metavar="STOPS",
