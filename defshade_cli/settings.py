@@ -30,6 +30,7 @@ class RenderSettings:
     exposure: stops added to the camera's own.
     shadows: False lights every surface that faces a light.
     complexity: how finely subdivision surfaces are refined: by their size in the image, or 0 to 3 levels all alike.
+    background: dome lights are seen behind the geometry, and cover there.
     light_tolerance: scene-linear value that all dropped light together may reach in one pixel.
     """
 
@@ -44,6 +45,7 @@ class RenderSettings:
     light_tolerance: float = 1e-5
     shadows: bool = True
     complexity: Complexity = "auto"
+    background: bool = True
 
 
 @dataclass(frozen=True, slots=True)
