@@ -119,7 +119,15 @@ def render(stage: str | Path, *, camera: str | None = None, frame: float | None 
 
 
 def _reader(job: RenderJob) -> StageReader:
-    return StageReader(open_stage(job.stage), camera=job.camera, purposes=job.settings.purposes)
+    settings = job.settings
+    return StageReader(
+        open_stage(job.stage),
+        camera=job.camera,
+        purposes=settings.purposes,
+        complexity=settings.complexity,
+        size=settings.size,
+        width=settings.width,
+    )
 
 
 def _render_frame(

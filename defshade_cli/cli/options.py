@@ -205,12 +205,26 @@ def _image_options(layers: Sequence[str]) -> list[Function]:
             help="Whether geometry hides lights.",
         ),
         option(
+            "--background/--no-background",
+            default=_RENDER.background,
+            default_text="--background",
+            help="Whether dome lights are seen behind the geometry.",
+        ),
+        option(
             "--gbuffer",
             "layout",
             type=click.Choice(settings.LAYOUTS),
             default=_RENDER.layout,
             default_text=str(_RENDER.layout),
             help="Encoding of the GBuffer that lighting reads; data layers are always read as float.",
+        ),
+        option(
+            "--complexity",
+            type=click.Choice(settings.COMPLEXITIES),
+            default=_RENDER.complexity,
+            default_text=str(_RENDER.complexity),
+            help="Refinement of subdivision surfaces: auto goes by their size in the image; low draws their cages, "
+            "medium, high and veryhigh one, two and three levels.",
         ),
         option(
             "--exposure",
