@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import moderngl
 import numpy as np
@@ -47,12 +48,15 @@ class DrawList:
     """All opaque geometry as one multi-draw.
 
     vertices: (buffer, format, attribute names) triples as moderngl takes them; indices: 32-bit.
-    commands: the indirect buffer, one draw a subset, instanced.
+    commands: the indirect buffer, one draw a subset, instanced; table: the same as (C,) records.
+    corners: (C, 8, 3) of a box around what each command draws, relative to the eye; not finite where nothing is known.
     """
 
     vertices: tuple[tuple, ...]
     indices: moderngl.Buffer
     commands: moderngl.Buffer
+    table: NDArray
+    corners: NDArray[np.float64]
     color_varies: bool
 
 
@@ -81,7 +85,7 @@ class GpuScene:
         vertices = [(positions, "3f", "position_object"), (normals, "3f", "normal_object")]
         vertices += [(buffer, "4f", "vertex_color") for buffer in colors]
         vertices.append((self._draws[1], "2u4/i", "draw"))
-        return DrawList(tuple(vertices), indices, self._draws[0], color_varies)
+        return DrawList(tuple(vertices), indices, self._draws[0], commands, command_corners(scene), color_varies)
 
     def _replaced(self, old: list[moderngl.Buffer], arrays: Sequence[NDArray]) -> list[moderngl.Buffer]:
         for buffer in old:
@@ -142,6 +146,13 @@ def draw_commands(drawables: Sequence[Drawable], meshes: Sequence[Mesh]) -> tupl
             first_row += count
         first_instance += count
     return np.array(commands, _COMMAND), np.concatenate(rows) if rows else np.empty((0, 2), np.uint32)
+
+
+def command_corners(scene: Scene) -> NDArray[np.float64]:
+    """(C, 8, 3) of the box around each command's drawable, relative to the camera."""
+    boxes = [np.array(list(product(*(box - scene.camera.position).T))) for box in scene.drawable_bounds]
+    counts = [len(drawable.subsets) for drawable in scene.drawables]
+    return np.repeat(np.array(boxes).reshape(-1, 8, 3), counts, axis=0)
 
 
 def _same(old: tuple[Mesh, ...], new: tuple[Mesh, ...]) -> bool:

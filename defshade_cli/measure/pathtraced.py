@@ -70,16 +70,13 @@ def _world(scene: Scene, plan: Plan) -> dict[str, Any]:
 
 def _sensor(plan: Plan) -> dict[str, Any]:
     camera = plan.camera
-    left, right, bottom, top = camera.window
+    left, right, _, _ = camera.window
     if camera.projection != "perspective":
         raise DefshadeError(f"{camera.path}: path tracing takes perspective cameras only")
     film = {"type": "hdrfilm", "width": plan.size[0], "height": plan.size[1], "rfilter": {"type": "box"}}
     return {
-        "type": "perspective",
         "fov_axis": "x",
         "fov": math.degrees(2.0 * math.atan((right - left) / 2.0)),
-        "principal_point_offset_x": -(left + right) / 2.0 / (right - left),
-        "principal_point_offset_y": (bottom + top) / 2.0 / (top - bottom),
         "near_clip": plan.clip[0],
         "far_clip": plan.clip[1],
         "to_world": _transform(camera.world_from_camera @ np.diag([-1.0, 1.0, -1.0, 1.0])),
@@ -89,8 +86,15 @@ def _sensor(plan: Plan) -> dict[str, Any]:
 
 
 def _lens(camera: Camera) -> dict[str, Any]:
+    left, right, bottom, top = camera.window
     if camera.f_stop <= 0.0 or camera.focus_distance <= 0.0:
-        return {}
+        return {
+            "type": "perspective",
+            "principal_point_offset_x": -(left + right) / 2.0 / (right - left),
+            "principal_point_offset_y": (bottom + top) / 2.0 / (top - bottom),
+        }
+    if left + right or bottom + top:
+        raise DefshadeError(f"{camera.path}: path tracing takes no shifted window behind a lens")
     radius = 0.5 * camera.focal_length / camera.f_stop
     return {"type": "thinlens", "aperture_radius": radius, "focus_distance": camera.focus_distance}
 

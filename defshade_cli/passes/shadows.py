@@ -31,6 +31,7 @@ CAPACITY = TILES * TILES
 _WIDEST_DEGREES = 60.0
 _NO_WINDOW: Window = (-1.0, 1.0, -1.0, 1.0)
 _NEAREST = 1e-4  # near plane over far plane, where nothing else bounds it
+_ROUNDING = 1e-5  # what float32 may move a corner, over the greatest coordinate
 _FACES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], np.float64)
 
 
@@ -141,6 +142,7 @@ class ShadowPass:
         self._depth = gpu.keep(gpu.depth_texture(size))
         self._framebuffer = gpu.keep(gpu.context.framebuffer([], self._depth))
         self._maps = RecordBuffer(gpu, SHADOW_MAPS)
+        self._commands = gpu.keep(gpu.context.buffer(reserve=256))
 
     def draw(self, draws: DrawList, cameras: Sequence[tuple[Camera, ...]], jitter: tuple[float, float]) -> ShadowAtlas:
         """The maps of each light's cameras, at most CAPACITY in all; a light may have none. `jitter` is in texels."""
@@ -149,37 +151,56 @@ class ShadowPass:
         maps = [camera for light in cameras for camera in light]
         assert len(maps) <= CAPACITY
         self._framebuffer.use()
+        self._framebuffer.viewport = (0, 0, *self._depth.size)
         self._framebuffer.clear(depth=0.0)
-        self._context.enable_only(moderngl.DEPTH_TEST)
-        self._context.depth_func = ">"
-        records = np.zeros(max(len(maps), 1), record("ShadowMap"))
-        vertices = [part for part in draws.vertices if any(name in self._program for name in part[2:])]
-        array = self._context.vertex_array(self._program, vertices, draws.indices)
-        for tile, camera in enumerate(maps):
-            records[tile] = self._draw_map(array, draws, camera, tile, jitter)
-        array.release()
-        self._maps.write(records)
+        if maps:
+            self._draw_maps(draws, np.array([_map_record(camera, n, jitter) for n, camera in enumerate(maps)]))
         return ShadowAtlas(self._depth, first, count)
 
-    def _draw_map(
-        self, array: moderngl.VertexArray, draws: DrawList, camera: Camera, tile: int, jitter: tuple[float, float]
-    ) -> NDArray:
-        left, right, bottom, top = camera.window
-        texel = ((right - left) / RESOLUTION, (top - bottom) / RESOLUTION)
-        window = (
-            left + jitter[0] * texel[0],
-            right + jitter[0] * texel[0],
-            bottom + jitter[1] * texel[1],
-            top + jitter[1] * texel[1],
-        )
-        clip_from_light = clip_from_camera(camera, window, camera.clipping_range, standard=False)
-        matrix = (clip_from_light @ camera.camera_from_world).T.astype(np.float32)
-        column, row = tile % TILES, tile // TILES
-        self._framebuffer.viewport = (column * RESOLUTION, row * RESOLUTION, RESOLUTION, RESOLUTION)
-        self._program["clip_from_relative"] = tuple(matrix.ravel().tolist())
-        array.render_indirect(draws.commands)
-        map_record = np.zeros((), record("ShadowMap"))
-        map_record["clip_from_relative"] = matrix
-        map_record["tile"] = (column / TILES, row / TILES, 1 / TILES, 1 / TILES)
-        map_record["texel"], map_record["resolution"] = max(texel), RESOLUTION
-        return map_record
+    def _draw_maps(self, draws: DrawList, records: NDArray) -> None:
+        """Each map with the commands that it may see."""
+        commands = [draws.table[_may_see(m, draws.corners)] for m in records["clip_from_relative"]]
+        self._write_commands(np.concatenate(commands))
+        self._context.enable_only(moderngl.DEPTH_TEST)
+        self._context.depth_func = ">"
+        vertices = [part for part in draws.vertices if any(name in self._program for name in part[2:])]
+        array = self._context.vertex_array(self._program, vertices, draws.indices)
+        first = 0
+        for tile, (row, seen) in enumerate(zip(records, commands, strict=True)):
+            x, y = tile % TILES, tile // TILES
+            self._framebuffer.viewport = (x * RESOLUTION, y * RESOLUTION, RESOLUTION, RESOLUTION)
+            self._program["clip_from_relative"] = tuple(row["clip_from_relative"].ravel().tolist())
+            if len(seen):
+                array.render_indirect(self._commands, count=len(seen), first=first)
+            first += len(seen)
+        array.release()
+        self._maps.write(records)
+
+    def _write_commands(self, commands: NDArray) -> None:
+        data = commands.tobytes()
+        self._commands.orphan(max(len(data), self._commands.size))
+        self._commands.write(data)
+
+
+def _map_record(camera: Camera, tile: int, jitter: tuple[float, float]) -> NDArray:
+    """The ShadowMap of a tile, its camera's window moved by `jitter`."""
+    left, right, bottom, top = camera.window
+    texel = ((right - left) / RESOLUTION, (top - bottom) / RESOLUTION)
+    dx, dy = jitter[0] * texel[0], jitter[1] * texel[1]
+    window = left + dx, right + dx, bottom + dy, top + dy
+    clip_from_light = clip_from_camera(camera, window, camera.clipping_range, standard=False)
+    row = np.zeros((), record("ShadowMap"))
+    row["clip_from_relative"] = (clip_from_light @ camera.camera_from_world).T
+    row["tile"] = (tile % TILES / TILES, tile // TILES / TILES, 1 / TILES, 1 / TILES)
+    row["texel"], row["resolution"] = max(texel), RESOLUTION
+    return row
+
+
+def _may_see(relative_to_clip: NDArray[np.float32], corners: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(C,) False for boxes (C, 8, 3) that lie wholly beyond a plane of the frustum; the matrix is transposed."""
+    with np.errstate(invalid="ignore"):
+        clip = corners @ relative_to_clip[:3].astype(np.float64) + relative_to_clip[3]
+        xyz, w = clip[..., :3], clip[..., 3:]
+        slack = _ROUNDING * np.abs(clip).max(axis=(1, 2), keepdims=True)
+        below, above = xyz < np.array([-1.0, -1.0, 0.0]) * w - slack, xyz > w + slack
+    return ~(below.all(axis=1) | above.all(axis=1)).any(axis=1)

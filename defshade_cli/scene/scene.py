@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.scene.camera import Camera
-from defshade_cli.scene.geometry import Drawable, Mesh
+from defshade_cli.scene.geometry import Drawable, Mesh, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import Material
 from defshade_cli.spaces import ConformPolicy
@@ -52,25 +51,13 @@ class Scene:
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
         """(2, 3) world-space box around every drawable; (+inf, −inf) for a scene without geometry."""
-        low, high = self.drawable_bounds[:, 0], self.drawable_bounds[:, 1]
-        return np.stack([low.min(axis=0, initial=np.inf), high.max(axis=0, initial=-np.inf)])
+        return enclose(self.drawable_bounds)
 
     @cached_property
-    def drawable_bounds(self) -> NDArray[np.float64]:
-        """(D, 2, 3) world-space box around all placements of each drawable; (+inf, −inf) around none."""
-        boxes = np.empty((len(self.drawables), 2, 3))
-        for box, drawable in zip(boxes, self.drawables, strict=True):
-            corners = self._world_corners(drawable)
-            corners = corners[np.isfinite(corners).all(axis=1)]
-            box[0], box[1] = corners.min(axis=0, initial=np.inf), corners.max(axis=0, initial=-np.inf)
-        return boxes
-
-    def _world_corners(self, drawable: Drawable) -> NDArray[np.float64]:
-        box = np.array(list(product(*self.meshes[drawable.mesh].bounds.T)))
-        if not np.isfinite(box).all():
-            return np.empty((0, 3))
-        linear, offset = drawable.world_from_object[:, :3, :3], drawable.world_from_object[:, None, :3, 3]
-        return (box @ linear.transpose(0, 2, 1) + offset).reshape(-1, 3)
+    def drawable_bounds(self) -> tuple[NDArray[np.float64], ...]:
+        """(2, 3) world-space box around all placements of each drawable; (+inf, −inf) around none."""
+        boxes = [world_boxes(self.meshes[d.mesh].bounds, d.world_from_object) for d in self.drawables]
+        return tuple(enclose([box]) for box in boxes)
 
     @cached_property
     def triangle_count(self) -> int:
