@@ -51,13 +51,13 @@ class Scene:
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
         """(2, 3) world-space box around every drawable; (+inf, −inf) for a scene without geometry."""
-        return enclose(self.drawable_bounds)
+        return enclose([self.drawable_bounds])
 
     @cached_property
-    def drawable_bounds(self) -> tuple[NDArray[np.float64], ...]:
-        """(2, 3) world-space box around all placements of each drawable; (+inf, −inf) around none."""
+    def drawable_bounds(self) -> NDArray[np.float64]:
+        """(D, 2, 3) world-space box around all placements of each drawable; (+inf, −inf) around none."""
         boxes = [world_boxes(self.meshes[d.mesh].bounds, d.world_from_object) for d in self.drawables]
-        return tuple(enclose([box]) for box in boxes)
+        return np.array([enclose([box]) for box in boxes]).reshape(-1, 2, 3)
 
     @cached_property
     def triangle_count(self) -> int:
