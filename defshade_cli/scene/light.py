@@ -17,7 +17,6 @@ from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import elliprg
 
 from defshade_cli.scene.arrays import frozen
 from defshade_cli.spaces import Matrix, normalize
@@ -136,6 +135,10 @@ class SphereLight(Light):
     def size_factor(self) -> float:
         """Area of the ellipsoid that the transform makes: 4π R_G(a²b², a²c², b²c²) (DLMF 19.33.1)."""
         a, b, c = (self.radius * np.linalg.svd(self.world_from_light[:3, :3], compute_uv=False)) ** 2
+        if np.isclose(a, c, rtol=1e-12):
+            return 4.0 * math.pi * float(a)
+        from scipy.special import elliprg  # a quarter of a second to import, and few lights are ellipsoids
+
         return 4.0 * math.pi * float(elliprg(a * b, a * c, b * c))
 
 

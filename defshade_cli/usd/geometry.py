@@ -18,7 +18,7 @@ from defshade_cli.usd.gprims import read_solid, size_attributes
 from defshade_cli.usd.mesh import MESH_ATTRIBUTES, read_mesh
 from defshade_cli.usd.normals import with_normals
 from defshade_cli.usd.polygons import Polygons, Primvar
-from defshade_cli.usd.primvars import find_display
+from defshade_cli.usd.primvars import find_display, find_uvs
 from defshade_cli.usd.subsets import FaceGroup, group_faces, material_subsets
 from defshade_cli.usd.triangulation import triangulate
 
@@ -52,7 +52,7 @@ def read_gprim(prim: Usd.Prim, time: Usd.TimeCode) -> Gprim | None:
     polygons = _read_polygons(prim, time, issues)
     if polygons is None:
         return None
-    polygons = with_normals(polygons).without_holes()
+    polygons = with_normals(polygons).without_holes().joined()
     mesh = _to_mesh(prim, polygons, issues)
     mesh, groups = group_faces(mesh, prim, time, issues)
     color, opacity = _constant(polygons.display_color), _constant(polygons.display_opacity)
@@ -72,6 +72,7 @@ def is_time_varying(prim: Usd.Prim) -> bool:
         UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals"),
         find_display(prim, "displayColor"),
         find_display(prim, "displayOpacity"),
+        *find_uvs(prim),
     )
     subsets = (subset.GetIndicesAttr() for subset in material_subsets(prim))
     sources = (*(prim.GetAttribute(name) for name in names), *primvars, *subsets)
@@ -91,7 +92,7 @@ def _to_mesh(prim: Usd.Prim, polygons: Polygons, issues: list[str]) -> Mesh:
         corners = corners[:, ::-1]
     normals, color, opacity = polygons.normals, polygons.display_color, polygons.display_opacity
     assert normals is not None
-    split = any(primvar.splits_points for primvar in (normals, color, opacity) if primvar is not None)
+    split = any(primvar.splits_points for primvar in polygons.primvars)
     place = polygons.at_corners if split else polygons.at_points
     return Mesh(
         path=str(prim.GetPath()),
@@ -102,6 +103,7 @@ def _to_mesh(prim: Usd.Prim, polygons: Polygons, issues: list[str]) -> Mesh:
         display_color=place(color) if _varies(color) else None,
         display_opacity=place(opacity) if _varies(opacity) else None,
         double_sided=bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get()),
+        uvs={name: place(uv) for name, uv in polygons.uvs.items()},
     )
 
 

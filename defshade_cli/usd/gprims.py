@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pxr import Usd
 
 from defshade_cli.usd.polygons import Polygons
-from defshade_cli.usd.primvars import Elements, count_elements, read_display
+from defshade_cli.usd.primvars import Elements, count_elements, read_display, read_uvs
 from defshade_cli.usd.revolution import Strip, arc, disk, revolve, side
 from defshade_cli.usd.values import floats
 
@@ -106,6 +106,7 @@ def read_solid(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> Polygon
         _along(polygons, _SPINE[axis]),
         display_color=read_display(prim, "displayColor", 3, time, elements, issues),
         display_opacity=read_display(prim, "displayOpacity", 1, time, elements, issues),
+        uvs=read_uvs(prim, time, elements, issues),
     )
 
 

@@ -8,7 +8,7 @@ from pxr import Usd, UsdGeom
 
 from defshade_cli.usd.normals import mend_normals
 from defshade_cli.usd.polygons import SCHEMES, Polygons, Primvar, Scheme
-from defshade_cli.usd.primvars import Authored, Elements, authored, count_elements, fit, read_display
+from defshade_cli.usd.primvars import Authored, Elements, authored, count_elements, fit, read_display, read_uvs
 from defshade_cli.usd.values import floats, integers
 
 MESH_ATTRIBUTES = ("points", "faceVertexCounts", "faceVertexIndices", "holeIndices", "normals")
@@ -34,6 +34,7 @@ def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> Poly
         normals=_normals(mesh, time, elements, issues) if scheme == "none" else None,
         display_color=read_display(mesh.GetPrim(), "displayColor", 3, time, elements, issues),
         display_opacity=read_display(mesh.GetPrim(), "displayOpacity", 1, time, elements, issues),
+        uvs=read_uvs(mesh.GetPrim(), time, elements, issues),
     )
     return mend_normals(_without_broken_faces(polygons, issues), issues)
 

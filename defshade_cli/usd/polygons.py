@@ -6,7 +6,7 @@ takes and gives it. A corner is one face-vertex.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -50,6 +50,7 @@ class Polygons:
     scheme: how the surface follows from the polygons; `none` when they are the surface.
     left_handed: the corners run clockwise seen from outside.
     normals: None where they follow from the shape.
+    uvs: texture coordinates (N, 2) by name.
     """
 
     points: NDArray[np.float32]
@@ -62,6 +63,13 @@ class Polygons:
     normals: Primvar | None = None
     display_color: Primvar | None = None
     display_opacity: Primvar | None = None
+    uvs: Mapping[str, Primvar] = field(default_factory=dict)
+
+    @property
+    def primvars(self) -> tuple[Primvar, ...]:
+        """All that lies on the faces, points and corners."""
+        named = (self.normals, self.display_color, self.display_opacity, *self.uvs.values())
+        return tuple(primvar for primvar in named if primvar is not None)
 
     @cached_property
     def face_of_corner(self) -> NDArray[np.int32]:
@@ -88,24 +96,45 @@ class Polygons:
             return self
         corners = kept[self.face_of_corner]
 
-        def pick(primvar: Primvar | None) -> Primvar | None:
-            if primvar is None or not primvar.splits_points:
+        def pick(primvar: Primvar) -> Primvar:
+            if not primvar.splits_points:
                 return primvar
             mask = kept if primvar.interpolation == "uniform" else corners
             return replace(primvar, values=primvar.values[mask])
 
+        chosen = replace(self, counts=self.counts[kept], indices=self.indices[corners], faces=self.faces[kept])
+        return chosen.with_primvars(pick)
+
+    def with_primvars(self, change: Callable[[Primvar], Primvar]) -> Polygons:
+        """The same with every primvar changed."""
+
+        def changed(primvar: Primvar | None) -> Primvar | None:
+            return None if primvar is None else change(primvar)
+
         return replace(
             self,
-            counts=self.counts[kept],
-            indices=self.indices[corners],
-            faces=self.faces[kept],
-            normals=pick(self.normals),
-            display_color=pick(self.display_color),
-            display_opacity=pick(self.display_opacity),
+            normals=changed(self.normals),
+            display_color=changed(self.display_color),
+            display_opacity=changed(self.display_opacity),
+            uvs={name: change(uv) for name, uv in self.uvs.items()},
         )
 
     def without_holes(self) -> Polygons:
         return self.select(~np.isin(self.faces, self.holes)) if len(self.holes) else self
+
+    def joined(self) -> Polygons:
+        """The same with face-varying primvars on the points, where the corners at every point agree."""
+        a_corner = np.zeros(len(self.points), np.intp)
+        a_corner[self.indices] = np.arange(len(self.indices))
+
+        def join(primvar: Primvar) -> Primvar:
+            if primvar.interpolation != "faceVarying" or not len(primvar.values):
+                return primvar
+            at_points = primvar.values[a_corner]
+            agree = np.array_equal(at_points[self.indices], primvar.values)
+            return Primvar(at_points, "vertex") if agree else primvar
+
+        return self.with_primvars(join)
 
     def at_corners(self, primvar: Primvar) -> NDArray[np.float32]:
         """(C, ...) a primvar of any interpolation."""

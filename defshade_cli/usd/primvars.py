@@ -8,13 +8,17 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.usd.polygons import Interpolation, Primvar
 from defshade_cli.usd.values import floats, integers
 
 Elements = Mapping[str, int]
 """How many values each interpolation needs."""
+
+_UV_TYPES = tuple(
+    Sdf.ValueTypeNames.Find(name) for name in ("texCoord2f", "texCoord2d", "texCoord2h", "float2", "double2", "half2")
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,15 +47,23 @@ def find_display(prim: Usd.Prim, name: str) -> UsdGeom.Primvar:
     return UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
 
 
+def find_uvs(prim: Usd.Prim) -> list[UsdGeom.Primvar]:
+    """Every primvar that may be texture coordinates, two floats a value: the prim's own, and inherited constants."""
+    primvars = UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance()
+    return [primvar for primvar in primvars if primvar.GetTypeName().scalarType in _UV_TYPES]
+
+
+def read_uvs(prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> dict[str, Primvar]:
+    """Texture coordinates by name, those that fit and are finite."""
+    read = {str(p.GetPrimvarName()): _fit_finite(authored(p, time), 2, elements, issues) for p in find_uvs(prim)}
+    return {name: primvar for name, primvar in read.items() if primvar is not None}
+
+
 def read_display(
     prim: Usd.Prim, name: str, width: int, time: Usd.TimeCode, elements: Elements, issues: list[str]
 ) -> Primvar | None:
     """displayColor or displayOpacity, all finite; None where there is none or it does not fit."""
-    primvar = fit(authored(find_display(prim, name), time), width, elements, issues)
-    if primvar is None or np.isfinite(primvar.values).all():
-        return primvar
-    issues.append(f"primvars:{name} is left out: not all of its values are finite")
-    return None
+    return _fit_finite(authored(find_display(prim, name), time), width, elements, issues)
 
 
 def fit(source: Authored | None, width: int, elements: Elements, issues: list[str]) -> Primvar | None:
@@ -74,6 +86,14 @@ def fit(source: Authored | None, width: int, elements: Elements, issues: list[st
     if not 0 < needed <= len(values):
         return None
     return Primvar(values[:needed], cast(Interpolation, source.interpolation))
+
+
+def _fit_finite(source: Authored | None, width: int, elements: Elements, issues: list[str]) -> Primvar | None:
+    primvar = fit(source, width, elements, issues)
+    if source is None or primvar is None or np.isfinite(primvar.values).all():
+        return primvar
+    issues.append(f"{source.name} is left out: not all of its values are finite")
+    return None
 
 
 def _resolved(source: Authored, width: int) -> NDArray[np.float32] | str:
