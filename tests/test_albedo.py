@@ -73,7 +73,8 @@ def test_edge_bound_falls_with_the_cosine(one: float, other: float, alpha: float
     low, high = sorted((one, other))
     bounds = edge_bound(np.array([low, high]), np.array(alpha), fit)
     assert bounds[0] >= bounds[1] - 1e-12
-    assert 0.0 <= bounds[1] and bounds[0] <= 1.0
+    assert bounds[0] <= 1.0
+    assert bounds[1] >= 0.0
 
 
 def test_albedo_of_a_mirror_is_schlicks_term() -> None:

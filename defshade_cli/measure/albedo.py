@@ -25,7 +25,7 @@ VISIBILITY: dict[Shading, Visibility] = {"preview-surface": V_SmithGGXCorrelated
 COSINES = np.concatenate([[1e-4, 1e-3, 3e-3, 0.01, 0.02, 0.03], np.linspace(0.05, 1.0, 39)])
 ALPHAS = np.concatenate([[1e-4, 1e-3, 2.5e-3, 5e-3, 0.01, 0.02], np.linspace(0.04, 1.0, 25)])
 TOLERANCE = 1e-4
-"""What the fit may fall short by: the quadrature's error, and B at normal incidence, 5e-5 at most, where the fit is 0."""
+"""What the fit may fall short by: the quadrature's error. B at normal incidence, where the fit is 0, is half of it."""
 _GRAZING, _GRAZING_WEIGHT = 0.1, 0.25
 """Excess at cosines below, where a surface is a thin rim of its picture, counts a quarter."""
 _STEPS, _DAMPED = 30, 15
