@@ -24,7 +24,7 @@ from defshade_cli.errors import UsageError
 from defshade_cli.image.layers import LAYERS
 from defshade_cli.passes.planes import PLANES, Plane, needed_planes
 from defshade_cli.scene.camera import Camera
-from defshade_cli.scene.light import DistantLight, Light
+from defshade_cli.scene.light import DistantLight, DomeLight, Light
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Layout, RenderSettings, Shading
@@ -63,7 +63,7 @@ class Plan:
     camera: conformed to the image.  clip: (near, far), the camera's range tightened to the geometry.
     exposure: linear, the camera's and the settings' together.
     planes: of the GBuffer; lights: sorted quads, spheres, cones.
-    shadows: some light casts them.  cutout: some opacity is below 1.
+    shadows: some light casts them.  background: domes are seen where no geometry is.  cutout: some opacity is below 1.
     data_pass: data layers need an unjittered float GBuffer of their own.
     """
 
@@ -78,6 +78,7 @@ class Plan:
     planes: tuple[Plane, ...]
     lights: tuple[PlannedLight, ...]
     shadows: bool
+    background: bool
     cutout: bool
     data_pass: bool
 
@@ -87,6 +88,10 @@ class Plan:
         return any(LAYERS[name].source == "lighting" for name in self.layers)
 
     @property
+    def domes(self) -> tuple[DomeLight, ...]:
+        return tuple(planned.light for planned in self.lights if isinstance(planned.light, DomeLight))
+
+    @property
     def volumes(self) -> tuple[Volume, ...]:
         """The kinds of volume that some light has, in the order of the lights."""
         return tuple(dict.fromkeys(planned.volume for planned in self.lights))
@@ -94,7 +99,8 @@ class Plan:
     @property
     def passes(self) -> tuple[str, ...]:
         """Names of the passes in the order of the pipeline."""
-        lighting = ("gbuffer", "emission", *("shadow maps",) * self.shadows, *(f"light {v}" for v in self.volumes))
+        before = ("gbuffer", "emission", *("environment",) * bool(self.domes), *("shadow maps",) * self.shadows)
+        lighting = before + tuple(f"light {volume}" for volume in self.volumes)
         accumulation = ("accumulation",) * (self.samples > 1)
         data = ("data gbuffer",) * (self.data_pass or not self.lit)
         return (lighting + accumulation if self.lit else ()) + data
@@ -129,6 +135,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         planes=planes,
         lights=lights,
         shadows=shadows,
+        background=settings.background,
         cutout=cutout,
         data_pass=data_pass,
     )
@@ -170,8 +177,8 @@ def _tight_clip(camera: Camera, bounds: NDArray[np.float64]) -> tuple[float, flo
 
 
 def volume_of(light: Light) -> Volume:
-    """Distant light → quad; a cone of at most 90° → cone; every other light → sphere."""
-    if isinstance(light, DistantLight):
+    """Distant and dome lights → quad; a cone of at most 90° → cone; every other light → sphere."""
+    if light.is_infinite:
         return "quad"
     return "cone" if light.shaping and light.shaping.cone_angle <= 90.0 else "sphere"
 
@@ -202,7 +209,7 @@ def _peak(light: Light) -> float:
 
 
 def _reach(light: Light, bounds: NDArray[np.float64], gain: float) -> float:
-    if isinstance(light, DistantLight):
+    if light.is_infinite:
         return math.inf
     farthest = np.max(np.abs(bounds - light.position), axis=0)
     geometry = float(np.linalg.norm(farthest)) * (1.0 + _MARGIN)
@@ -217,6 +224,7 @@ def _explain(plan: Plan) -> Iterator[Decision]:
         count = sum(planned.volume == volume for planned in plan.lights)
         yield Decision(f"{volume} volumes", f"{count} drawn" if count else "skipped", "lights that reach geometry")
     yield _kept("shadow maps", plan.shadows, "a light casts them", "no light casts any, or none were asked")
+    yield _kept("environment", bool(plan.domes), "a dome lights the scene", "no dome")
     yield _kept("cutout", plan.cutout, "some opacity is below 1", "no opacity is below 1")
     if any(LAYERS[name].source != "lighting" for name in plan.layers):
         jittered, shared = "the beauty's is jittered, quantised or dithered", "the beauty's own float sample serves"

@@ -27,6 +27,7 @@ class RenderSettings:
     samples: jittered samples a pixel; 1 is a sample at the pixel's centre.
     exposure: stops added to the camera's own.
     shadows: False lights every surface that faces a light.
+    background: dome lights are seen behind the geometry, and cover there.
     light_tolerance: scene-linear value that all dropped light together may reach in one pixel.
     """
 
@@ -40,6 +41,7 @@ class RenderSettings:
     purposes: tuple[str, ...] = ("default", "render")
     light_tolerance: float = 1e-5
     shadows: bool = True
+    background: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -197,6 +197,12 @@ def _image_options(layers: Sequence[str]) -> list[Function]:
             help="Whether geometry hides lights.",
         ),
         option(
+            "--background/--no-background",
+            default=_RENDER.background,
+            default_text="--background",
+            help="Whether dome lights are seen behind the geometry.",
+        ),
+        option(
             "--gbuffer",
             "layout",
             type=click.Choice(settings.LAYOUTS),

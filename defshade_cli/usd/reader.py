@@ -124,7 +124,8 @@ def _lights(pieces: Iterable[Piece]) -> Iterator[Light]:
         if isinstance(piece.content, Light):
             count = len(piece.root_from_object)
             paths = piece.paths if len(piece.paths) == count else piece.paths * count
-            for path, world_from_light in zip(paths, piece.root_from_object, strict=True):
+            for path, world_from_object in zip(paths, piece.root_from_object, strict=True):
+                world_from_light = world_from_object @ piece.content.world_from_light
                 yield replace(piece.content, path=path, world_from_light=world_from_light)
 
 
