@@ -23,17 +23,16 @@ from numpy.typing import NDArray
 from defshade_cli.errors import UsageError
 from defshade_cli.image.layers import LAYERS
 from defshade_cli.passes.planes import PLANES, Plane, needed_planes
-from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.light import DistantLight, DomeLight, Light
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
-from defshade_cli.settings import Layout, RenderSettings, Shading
+from defshade_cli.settings import Complexity, Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
 from defshade_cli.units import exposure_scale
 
 Volume = Literal["quad", "sphere", "cone"]
 
-DEFAULT_SIZE = (1920, 1080)
 _MARGIN = 1e-3  # relative slack around bounds that float32 may round outwards
 _MIN_ALPHA = 1e-4  # shaders/lib/constants.glsl
 
@@ -65,6 +64,7 @@ class Plan:
     planes: of the GBuffer; lights: sorted quads, spheres, cones.
     shadows: some light casts them.  background: domes are seen where no geometry is.  cutout: some opacity is below 1.
     data_pass: data layers need an unjittered float GBuffer of their own.
+    levels: how often subdivision surfaces were refined, ascending; empty without any.
     """
 
     size: tuple[int, int]
@@ -81,6 +81,8 @@ class Plan:
     background: bool
     cutout: bool
     data_pass: bool
+    complexity: Complexity
+    levels: tuple[int, ...]
 
     @property
     def lit(self) -> bool:
@@ -114,7 +116,7 @@ class Plan:
 def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     """Decide. Raises UsageError for a layer that does not exist or an image without pixels."""
     _check_layers(settings.layers)
-    size = image_size(scene, settings)
+    size = image_size(scene.camera.aspect, settings.size, settings.width, scene.resolution)
     camera = scene.camera.conformed(size[0] * scene.pixel_aspect / size[1], scene.conform)
     exposure = camera.exposure * exposure_scale(settings.exposure)
     lights = _plan_lights(scene, exposure, settings)
@@ -138,17 +140,9 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         background=settings.background,
         cutout=cutout,
         data_pass=data_pass,
+        complexity=settings.complexity,
+        levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None})),
     )
-
-
-def image_size(scene: Scene, settings: RenderSettings) -> tuple[int, int]:
-    """(width, height): the settings', else the stage's, else 1920x1080. Raises UsageError for an empty image."""
-    size = settings.size or scene.resolution or DEFAULT_SIZE
-    if settings.width is not None:
-        size = (settings.width, max(1, round(settings.width / scene.camera.aspect)))
-    if min(size) < 1:
-        raise UsageError(f"an image of {size[0]}x{size[1]} has no pixels")
-    return size
 
 
 def _check_layers(names: tuple[str, ...]) -> None:
@@ -218,6 +212,7 @@ def _reach(light: Light, bounds: NDArray[np.float64], gain: float) -> float:
 
 def _explain(plan: Plan) -> Iterator[Decision]:
     yield Decision("layout", plan.layout, "as asked")
+    yield _explain_subdivision(plan)
     for plane in PLANES:
         yield _kept(f"plane {plane.name}", plane in plan.planes, "a material or layer needs it", "nothing needs it")
     for volume in ("quad", "sphere", "cone"):
@@ -231,6 +226,15 @@ def _explain(plan: Plan) -> Iterator[Decision]:
         yield _kept("data GBuffer", plan.data_pass or not plan.lit, jittered if plan.lit else "as asked", shared)
     if not plan.lit:
         yield Decision("lighting", "skipped", "no layer needs it")
+
+
+def _explain_subdivision(plan: Plan) -> Decision:
+    if not plan.levels:
+        return Decision("subdivision", "skipped", "no subdivision surface")
+    least, most = plan.levels[0], plan.levels[-1]
+    levels = f"{least} levels" if least == most else f"{least} to {most} levels"
+    reason = "by the surfaces' size in the image" if plan.complexity == "auto" else f"complexity {plan.complexity}"
+    return Decision("subdivision", levels, reason)
 
 
 def _kept(subject: str, kept: bool, why: str, why_not: str) -> Decision:

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from build import camera, quad, rotated, scene, sphere
 from numpy.typing import NDArray
 from stages import stage_of
 
-from build import camera, quad, rotated, scene, sphere
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.environment import sky_of
 from defshade_cli.passes.pipeline import Pipeline
