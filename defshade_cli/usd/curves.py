@@ -1,0 +1,122 @@
+"""BasisCurves → Polygons: tubes, or ribbons where normals are authored.
+
+Every sample of every curve is a weighted sum of control points: one sparse matrix takes points, and whatever lies on
+them, to samples.
+
+    segments of control points ── basis ── samples along the curves ── frames ── tubes | ribbons
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+from defshade_cli.usd.basis import LARGEST_DETAIL, CurveSamples, Kind, sample_curves
+from defshade_cli.usd.points import FALLBACK_WIDTH, read_widths
+from defshade_cli.usd.polygons import Polygons, Primvar
+from defshade_cli.usd.primvars import Authored, authored, fit, read_display, read_uvs
+from defshade_cli.usd.tubes import ribbons, tubes
+from defshade_cli.usd.values import floats, integers
+
+CURVES_ATTRIBUTES = ("points", "curveVertexCounts", "widths", "normals")
+"""What is read of BasisCurves that may vary over time, besides primvars."""
+
+QUAD_BUDGET = 1_000_000
+"""Quads of one prim up to which its tubes are round, and its segments many; more get the next lower detail."""
+
+_DETAILS = ((LARGEST_DETAIL, 12), (4, 6), (2, 3))
+"""Samples a segment of cubic curves, and sides of tubes."""
+
+
+def read_curves(curves: UsdGeom.BasisCurves, time: Usd.TimeCode, issues: list[str]) -> Polygons:
+    """All curves of the prim, each a face in the sense of `Polygons.faces`. Bad data becomes issues."""
+    value = curves.GetPointsAttr().Get(time)
+    points = None if value is None else floats(value, 3)
+    counts = integers(curves.GetCurveVertexCountsAttr().Get(time) or [])
+    points = np.empty((0, 3), np.float32) if points is None else points
+    counts = _complete(np.empty(0, np.int32) if counts is None else counts, len(points), issues)
+    if not np.isfinite(points).all():
+        issues.append("it is left out: not all of its points are finite")
+        counts = counts[:0]
+    kind = _kind(curves)
+    samples, sides = _detailed(kind, counts, len(points))
+    if samples.left_out:
+        issues.append(f"{samples.left_out} curves are left out: they have too few points")
+    return _build(curves, samples, points, sides, time, issues)
+
+
+def _complete(counts: NDArray[np.integer], available: int, issues: list[str]) -> NDArray[np.int64]:
+    """The curves whose points are all there."""
+    wanted = np.maximum(counts, 0).astype(np.int64)
+    complete = int(np.searchsorted(np.cumsum(wanted), available, "right"))
+    if not len(counts):
+        issues.append("it has no curves")
+    elif complete < len(counts):
+        issues.append(f"{len(counts) - complete} curves are left out: points ends before them")
+    return wanted[:complete]
+
+
+def _kind(curves: UsdGeom.BasisCurves) -> Kind:
+    basis = "linear" if curves.GetTypeAttr().Get() == UsdGeom.Tokens.linear else curves.GetBasisAttr().Get()
+    return Kind(str(basis), str(curves.GetWrapAttr().Get()))
+
+
+def _detailed(kind: Kind, counts: NDArray[np.int64], points: int) -> tuple[CurveSamples, int]:
+    """The finest samples within the budget, and sides."""
+    for detail, sides in _DETAILS:
+        samples = sample_curves(kind, counts, points, detail)
+        if samples.count * sides <= QUAD_BUDGET:
+            break
+    return samples, sides
+
+
+def _build(
+    curves: UsdGeom.BasisCurves,
+    samples: CurveSamples,
+    points: NDArray[np.float32],
+    sides: int,
+    time: Usd.TimeCode,
+    issues: list[str],
+) -> Polygons:
+    prim = curves.GetPrim()
+
+    def sampled(source: Authored | None, width: int) -> NDArray[np.float64] | None:
+        primvar = fit(source, width, samples.elements, issues)
+        return None if primvar is None else samples.at(primvar)
+
+    centres = samples.vertex @ points
+    radii = _radii(sampled(read_widths(prim, time), 1), samples.count, issues)
+    normals = sampled(_normals(curves, time), 3)
+    shape = tubes(samples, centres, radii, sides) if normals is None else ribbons(samples, centres, radii, normals)
+    around = len(shape.points) // max(samples.count, 1)
+    lying: Callable[[Primvar | None], Primvar | None] = lambda p: _around(p, samples, around)  # noqa: E731
+    uvs = {name: _around(uv, samples, around) for name, uv in read_uvs(prim, time, samples.elements, issues).items()}
+    return replace(
+        shape,
+        display_color=lying(read_display(prim, "displayColor", 3, time, samples.elements, issues)),
+        display_opacity=lying(read_display(prim, "displayOpacity", 1, time, samples.elements, issues)),
+        uvs={name: uv for name, uv in uvs.items() if uv is not None},
+    )
+
+
+def _normals(curves: UsdGeom.BasisCurves, time: Usd.TimeCode) -> Authored | None:
+    primvar = authored(UsdGeom.PrimvarsAPI(curves).GetPrimvar("normals"), time)
+    return primvar or Authored("normals", curves.GetNormalsAttr().Get(time), curves.GetNormalsInterpolation())
+
+
+def _radii(widths: NDArray[np.float64] | None, count: int, issues: list[str]) -> NDArray[np.float64]:
+    if widths is None:
+        issues.append(f"no widths that fit: {FALLBACK_WIDTH:g} is taken")
+        return np.full(count, FALLBACK_WIDTH / 2)
+    return np.abs(np.nan_to_num(widths, posinf=0.0, neginf=0.0)) / 2
+
+
+def _around(primvar: Primvar | None, samples: CurveSamples, around: int) -> Primvar | None:
+    """A primvar of the curves on the points of their polygons, `around` of them a sample."""
+    if primvar is None or primvar.interpolation == "constant":
+        return primvar
+    return Primvar(np.repeat(samples.at(primvar), around, axis=0).astype(np.float32), "vertex")
