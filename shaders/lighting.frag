@@ -13,6 +13,17 @@ float widened_roughness(float roughness, float alpha_squared) {
 flat in uint light_index;
 out vec4 radiance;
 
+// What of each lobe a light may show: the environment pass shows a dome in the sharp ones.
+vec3 lobe_response(Light light, Surface s) {
+    vec3 response = light.response.xyy;
+    if (light.is_sky == 0u) return response;
+#ifdef PLANE_CLEARCOAT
+    response.z *= 1.0 - sharpness(s.clearcoat_roughness);
+#endif
+    response.y *= 1.0 - sharpness(s.roughness);
+    return response;
+}
+
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     float stored = texelFetch(plane_depth, pixel, 0).x;
@@ -28,6 +39,6 @@ void main() {
         surface.roughness = widened_roughness(surface.roughness, widening);
         surface.clearcoat_roughness = widened_roughness(surface.clearcoat_roughness, widening);
     }
-    vec3 f = evaluate_brdf(surface, direction_to_eye(position), l, lights[light_index].response);
+    vec3 f = evaluate_brdf(surface, direction_to_eye(position), l, lobe_response(lights[light_index], surface));
     radiance = vec4(view.exposure * irradiance * f, 0.0);
 }

@@ -6,11 +6,12 @@ Importing this needs mitsuba (the extra `reference`) and an LLVM of 17 or newer,
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 from typing import Any
 
 from defshade_cli.errors import DefshadeError
-from defshade_cli.measure.brdf import COAT_F0, MIN_ALPHA, MIN_NOV
+from defshade_cli.measure.brdf import COAT_F0, MIN_ALPHA, MIN_NOV, SMITH_GGX, edge_bound
 
 _LLVM = tuple(f"libLLVM.so.{version}.1" for version in range(22, 17, -1)) + ("libLLVM-17.so.1",)
 
@@ -53,6 +54,12 @@ def _schlick(f0: Any, f90: Any, cosine: Any) -> Any:
     return f0 + (f90 - f0) * dr.power(dr.clip(1 - cosine, 0, 1), 5)
 
 
+def _taken(f0: Any, f90: Any, grazing: Any, alpha: float) -> Any:
+    """What a lobe may take from what lies below it: measure.brdf.E_bound, in Dr.Jit's terms."""
+    white = 1 - math.log(2) * alpha * alpha * grazing
+    return f0 * white + (f90 - f0) * edge_bound(grazing, alpha, SMITH_GGX)
+
+
 class PreviewSurface(mi.BSDF):
     """UsdPreviewSurface by the formulas of docs/lighting.md, the same on both sides."""
 
@@ -67,10 +74,14 @@ class PreviewSurface(mi.BSDF):
     def _reflectance(self, nov: Any, nol: Any, voh: Any, h: Any) -> Any:
         """f(l, v): the one place that holds the model."""
         fresnel = _schlick(self._f0, self._f90, voh)
-        diffuse = self._base * ((1 - self._metallic) * dr.inv_pi) * (1 - fresnel)
-        result = diffuse + _lobe(self._alpha, nov, nol, h) * fresnel
-        coat = self._clearcoat * _schlick(COAT_F0, 1.0, voh)
-        return result * (1 - coat) + _lobe(self._coat_alpha, nov, nol, h) * coat
+        grazing = dr.minimum(nov, nol)
+        taken = dr.maximum(fresnel, _taken(self._f0, self._f90, grazing, self._alpha))
+        diffuse = self._base * ((1 - self._metallic) * dr.inv_pi) * (1 - taken)
+        coat = _schlick(COAT_F0, 1.0, voh)
+        coat_taken = dr.maximum(coat, _taken(COAT_F0, 1.0, grazing, self._coat_alpha))
+        below = diffuse + _lobe(self._alpha, nov, nol, h) * fresnel
+        above = _lobe(self._coat_alpha, nov, nol, h) * (coat * self._clearcoat)
+        return below * (1 - self._clearcoat * coat_taken) + above
 
     def _facing(self, si: Any, wo: Any) -> tuple[Any, Any]:
         """Both directions in a shading frame whose normal lies on the viewer's side of the geometry."""

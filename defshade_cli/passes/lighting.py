@@ -126,6 +126,7 @@ def light_records(
         row["response"] = (planned.light.diffuse, planned.light.specular)
         aside = float(np.linalg.norm(emitter.position - planned.light.position))
         row["reach"], row["extent"] = planned.reach + aside, emitter.extent
+        row["is_sky"] = planned.light.kind == "dome"
         _set_shaping(row, planned.light.shaping)
     if shadows:
         records["first_shadow"], records["shadow_count"] = shadows.first, shadows.count
