@@ -4,6 +4,7 @@
 #   make test    run the tests
 #   make lint    ruff and mypy
 #   make docs    write docs/commands.md anew from the commands
+#   make accuracy  measure accumulated light against Mitsuba 3, into docs/accuracy.md
 #   make wheel   build dist/*.whl
 #   make clean   remove what was built, the virtual environment too
 
@@ -11,7 +12,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lint docs wheel clean
+.PHONY: demo test lint docs accuracy wheel clean
 
 PYTHON ?= python3
 BIN := .venv/bin
@@ -46,6 +47,9 @@ lint: .venv/.ready-dev
 docs: .venv/.ready
 	$(BIN)/python -m defshade_cli.cli.reference > docs/commands.md
 
+accuracy: .venv/.ready-reference
+	$(BIN)/python -m defshade_cli.measure.accuracy docs/accuracy.md
+
 wheel: .venv/.ready
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
 	ls dist/*.whl
@@ -62,6 +66,11 @@ clean:
 
 .venv/.ready-dev: .venv/.ready
 	$(BIN)/pip install --quiet --editable '.[dev]'
+	touch $@
+
+.venv/.ready-reference: .venv/.ready
+	$(BIN)/python -c 'from defshade_cli.measure.llvm import find_llvm; find_llvm()' 2>/dev/null || { $(call apt_install,libllvm19); }
+	$(BIN)/pip install --quiet --editable '.[reference]'
 	touch $@
 
 .venv/bin/pip:

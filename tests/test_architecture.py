@@ -39,6 +39,8 @@ FOREIGN = {
     "PyOpenColorIO": ("image",),
     "click": ("cli",),
     "rich": ("cli",),
+    "mitsuba": ("measure",),
+    "drjit": ("measure",),
 }
 
 MAX_LINES = 400

@@ -1,7 +1,7 @@
 """How near accumulated samples come to path-traced direct lighting, stage by stage, as a table for the docs.
 
 `python -m defshade_cli.measure.accuracy docs/accuracy.md` renders every stage and writes the table anew. References
-are kept in build/accuracy/ under a hash of all that they depend on.
+are kept in out/accuracy/ under a hash of all that they depend on.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderSettings
 
 SIZE = (320, 180)
-SAMPLES = (1, 4, 16, 64, 256)
-SHOWN = (1, 16, 256)
+SAMPLES = (1, 16, 256)
+
 REFERENCE_SAMPLES = 512
 STAGES = Path("accuracy")
-CACHE = Path("build/accuracy")
+CACHE = Path("out/accuracy")
 _CHARTS = ("materials",)
 
 _HEADER = "| stage | relMSE 1 | 16 | 256 | FLIP 1 | 16 | 256 | slope | reference's noise |"
@@ -116,7 +116,7 @@ def accuracy_table(results: Mapping[str, Accuracy]) -> str:
 
 
 def _row(stage: str, result: Accuracy) -> str:
-    shown = [result.by_samples[n] for n in SHOWN]
+    shown = [result.by_samples[n] for n in SAMPLES]
     errors = [f"{c.rel_mse:.1e}" for c in shown] + [f"{c.flip:.3f}" for c in shown]
     return f"| {stage} | " + " | ".join([*errors, f"{result.slope:.2f}", f"{result.noise:.0e}"]) + " |"
 

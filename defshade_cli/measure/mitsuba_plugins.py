@@ -5,32 +5,13 @@ Importing this needs mitsuba (the extra `reference`) and an LLVM of 17 or newer,
 
 from __future__ import annotations
 
-import ctypes
 import math
-import os
 from typing import Any
 
-from defshade_cli.errors import DefshadeError
 from defshade_cli.measure.brdf import COAT_F0, MIN_ALPHA, MIN_NOV, SMITH_GGX, edge_bound
+from defshade_cli.measure.llvm import find_llvm
 
-_LLVM = tuple(f"libLLVM.so.{version}.1" for version in range(22, 17, -1)) + ("libLLVM-17.so.1",)
-
-
-def _find_llvm() -> None:
-    """Name the newest LLVM there is to Dr.Jit, whose own search may take one too old for the processor."""
-    if "DRJIT_LIBLLVM_PATH" in os.environ:
-        return
-    for name in _LLVM:
-        try:
-            ctypes.CDLL(name)
-        except OSError:
-            continue
-        os.environ["DRJIT_LIBLLVM_PATH"] = name
-        return
-    raise DefshadeError(f"Mitsuba needs LLVM 17 or newer: none of {', '.join(_LLVM)} loads")
-
-
-_find_llvm()
+find_llvm()
 
 import drjit as dr  # noqa: E402
 import mitsuba as mi  # noqa: E402

@@ -105,7 +105,7 @@ class _Part:
 
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
-    triangles: NDArray[np.int64]
+    triangles: NDArray[np.uint32]
 
 
 def _parts(scene: Scene) -> Iterator[tuple[Material, _Part]]:

@@ -154,7 +154,10 @@ class ShadowPass:
         self._framebuffer.viewport = (0, 0, *self._depth.size)
         self._framebuffer.clear(depth=0.0)
         if maps:
-            self._draw_maps(draws, np.array([_map_record(camera, n, jitter) for n, camera in enumerate(maps)]))
+            records = np.zeros(len(maps), record("ShadowMap"))
+            for tile, camera in enumerate(maps):
+                records[tile] = _map_record(camera, tile, jitter)
+            self._draw_maps(draws, records)
         return ShadowAtlas(self._depth, first, count)
 
     def _draw_maps(self, draws: DrawList, records: NDArray) -> None:
