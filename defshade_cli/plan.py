@@ -25,6 +25,7 @@ from defshade_cli.image.layers import LAYERS
 from defshade_cli.passes.planes import PLANES, Plane, needed_planes
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.light import DistantLight, Light
+from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
@@ -62,7 +63,7 @@ class Plan:
     camera: conformed to the image.  clip: (near, far), the camera's range tightened to the geometry.
     exposure: linear, the camera's and the settings' together.
     planes: of the GBuffer; lights: sorted quads, spheres, cones.
-    shadows: some light casts them.  cutout: some opacity is below 1.
+    shadows: some light casts them.  cutout: some opacity may be below 1.  textures: some material reads them.
     data_pass: data layers need an unjittered float GBuffer of their own.
     """
 
@@ -78,6 +79,7 @@ class Plan:
     lights: tuple[PlannedLight, ...]
     shadows: bool
     cutout: bool
+    textures: bool
     data_pass: bool
 
     @property
@@ -129,6 +131,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         lights=lights,
         shadows=shadows,
         cutout=cutout,
+        textures=bool(scene.textures),
         data_pass=data_pass,
     )
 
@@ -150,7 +153,7 @@ def _check_layers(names: tuple[str, ...]) -> None:
 
 
 def _has_cutout(scene: Scene) -> bool:
-    if any(m.opacity < 1.0 or m.opacity_threshold > 0.0 for m in scene.materials):
+    if any(m.opacity < 1.0 or m.opacity_threshold > 0.0 or "opacity" in m.inputs for m in scene.materials):
         return True
     varying = [m.display_opacity for m in scene.meshes if m.display_opacity is not None]
     constant = [d.display_opacity for d in scene.drawables]
@@ -177,7 +180,7 @@ def volume_of(light: Light) -> Volume:
 
 def _plan_lights(scene: Scene, exposure: float, settings: RenderSettings) -> tuple[PlannedLight, ...]:
     lit = [light for light in scene.lights if _peak(light) > 0.0]
-    alpha = min((max(m.roughness**2, _MIN_ALPHA) for m in scene.materials), default=1.0)
+    alpha = min(map(_least_alpha, scene.materials), default=1.0)
     response = 1.0 / math.pi + 1.0 / (2.0 * math.pi * alpha**3)
     share = settings.light_tolerance / max(len(lit), 1)
     order: dict[str, int] = {"quad": 0, "sphere": 1, "cone": 2}
@@ -185,6 +188,10 @@ def _plan_lights(scene: Scene, exposure: float, settings: RenderSettings) -> tup
         PlannedLight(light, volume_of(light), _reach(light, scene.bounds, exposure * response / share)) for light in lit
     ]
     return tuple(sorted(planned, key=lambda p: order[p.volume]))
+
+
+def _least_alpha(material: Material) -> float:
+    return _MIN_ALPHA if "roughness" in material.inputs else max(material.roughness**2, _MIN_ALPHA)
 
 
 def _peak(light: Light) -> float:
@@ -209,7 +216,8 @@ def _explain(plan: Plan) -> Iterator[Decision]:
         count = sum(planned.volume == volume for planned in plan.lights)
         yield Decision(f"{volume} volumes", f"{count} drawn" if count else "skipped", "lights that reach geometry")
     yield _kept("shadow maps", plan.shadows, "a light casts them", "no light casts any, or none were asked")
-    yield _kept("cutout", plan.cutout, "some opacity is below 1", "no opacity is below 1")
+    yield _kept("cutout", plan.cutout, "some opacity is or may be below 1", "no opacity is below 1")
+    yield _kept("textures", plan.textures, "a material reads them", "no material reads any")
     if any(LAYERS[name].source != "lighting" for name in plan.layers):
         jittered, shared = "the beauty's is jittered, quantised or dithered", "the beauty's own float sample serves"
         yield _kept("data GBuffer", plan.data_pass or not plan.lit, jittered if plan.lit else "as asked", shared)

@@ -154,7 +154,7 @@ def test_a_reader_of_another_primvar_falls_back() -> None:
 def test_a_texture_falls_back_channel_by_channel() -> None:
     text = surface("m", FROM_TEXTURE, TEXTURE.format(fallback="float4 inputs:fallback = (1, 0.25, 0, 1)"))
     assert of_cube(text) == Material("/m", diffuse_color=(1, 0.25, 0), roughness=0.25)
-    assert issues(text) == ["not read: diffuseColor (UsdUVTexture), roughness (UsdUVTexture)"]
+    assert issues(text) == ["not read: diffuseColor (no file wood.png), roughness (no file wood.png)"]
 
 
 def test_a_texture_without_fallback_leaves_the_schemas_default() -> None:

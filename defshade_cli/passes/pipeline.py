@@ -35,7 +35,9 @@ class Pipeline:
         self._gbuffer_pass = cache(lambda variant: GBufferPass(gpu, variant))
         self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant))
         self._shadow_pass = cache(
-            lambda cutout, color_varies: ShadowPass(gpu, cutout=cutout, color_varies=color_varies)
+            lambda cutout, color_varies, texture_groups: ShadowPass(
+                gpu, cutout=cutout, color_varies=color_varies, texture_groups=texture_groups
+            )
         )
         self._accumulation = AccumulationPass(gpu)
 
@@ -81,7 +83,7 @@ class Pipeline:
         for batch in light_batches(scene, plan, sample):
             shadows = None
             if plan.shadows:
-                shadow_pass = self._shadow_pass(plan.cutout, draws.color_varies)
+                shadow_pass = self._shadow_pass(plan.cutout, draws.color_varies, draws.texture_groups)
                 shadows = shadow_pass.draw(draws, [lit.shadow_cameras for lit in batch], sample.texel_offset)
             lights, emitters = [lit.planned for lit in batch], [lit.emitter for lit in batch]
             self._lights.write(light_records(lights, emitters, plan.camera.position, shadows))
@@ -100,5 +102,5 @@ class Pipeline:
 
     def _draw_gbuffer(self, draws: DrawList, plan: Plan, gbuffer: GBuffer, sample: Sample) -> None:
         self._view.write(view_record(plan, gbuffer.layout, sample))
-        variant = GBufferVariant(gbuffer.planes, gbuffer.layout, plan.cutout, draws.color_varies)
+        variant = GBufferVariant(gbuffer.planes, gbuffer.layout, plan.cutout, draws.color_varies, draws.texture_groups)
         self._gbuffer_pass(variant).draw(draws, gbuffer)

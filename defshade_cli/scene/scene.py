@@ -13,6 +13,7 @@ from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import Material
+from defshade_cli.scene.texture import Texture
 from defshade_cli.spaces import ConformPolicy
 
 
@@ -65,6 +66,11 @@ class Scene:
             return np.empty((0, 3))
         linear, offset = drawable.world_from_object[:, :3, :3], drawable.world_from_object[:, None, :3, 3]
         return (box @ linear.transpose(0, 2, 1) + offset).reshape(-1, 3)
+
+    @cached_property
+    def textures(self) -> tuple[Texture, ...]:
+        """All that the materials read, each once."""
+        return tuple(dict.fromkeys(i.texture for material in self.materials for i in material.inputs.values()))
 
     @cached_property
     def triangle_count(self) -> int:
