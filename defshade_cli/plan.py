@@ -23,17 +23,16 @@ from numpy.typing import NDArray
 from defshade_cli.errors import UsageError
 from defshade_cli.image.layers import LAYERS
 from defshade_cli.passes.planes import PLANES, Plane, needed_planes
-from defshade_cli.scene.camera import Camera
-from defshade_cli.scene.light import DistantLight, Light
+from defshade_cli.scene.camera import Camera, image_size
+from defshade_cli.scene.light import DistantLight, DomeLight, Light
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
-from defshade_cli.settings import Layout, RenderSettings, Shading
+from defshade_cli.settings import Complexity, Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
 from defshade_cli.units import exposure_scale
 
 Volume = Literal["quad", "sphere", "cone"]
 
-DEFAULT_SIZE = (1920, 1080)
 _MARGIN = 1e-3  # relative slack around bounds that float32 may round outwards
 _MIN_ALPHA = 1e-4  # shaders/lib/constants.glsl
 
@@ -63,8 +62,10 @@ class Plan:
     camera: conformed to the image.  clip: (near, far), the camera's range tightened to the geometry.
     exposure: linear, the camera's and the settings' together.
     planes: of the GBuffer; lights: sorted quads, spheres, cones.
-    shadows: some light casts them.  cutout: some opacity may be below 1.  textures: some material reads them.
+    shadows: some light casts them.  background: domes are seen where no geometry is.
+    cutout: some opacity may be below 1.  textures: some material reads them.
     data_pass: data layers need an unjittered float GBuffer of their own.
+    levels: how often subdivision surfaces were refined, ascending; empty without any.
     """
 
     size: tuple[int, int]
@@ -78,14 +79,21 @@ class Plan:
     planes: tuple[Plane, ...]
     lights: tuple[PlannedLight, ...]
     shadows: bool
+    background: bool
     cutout: bool
     textures: bool
     data_pass: bool
+    complexity: Complexity
+    levels: tuple[int, ...]
 
     @property
     def lit(self) -> bool:
         """Does any layer need the lighting?"""
         return any(LAYERS[name].source == "lighting" for name in self.layers)
+
+    @property
+    def domes(self) -> tuple[DomeLight, ...]:
+        return tuple(planned.light for planned in self.lights if isinstance(planned.light, DomeLight))
 
     @property
     def volumes(self) -> tuple[Volume, ...]:
@@ -95,7 +103,8 @@ class Plan:
     @property
     def passes(self) -> tuple[str, ...]:
         """Names of the passes in the order of the pipeline."""
-        lighting = ("gbuffer", "emission", *("shadow maps",) * self.shadows, *(f"light {v}" for v in self.volumes))
+        before = ("gbuffer", "emission", *("environment",) * bool(self.domes), *("shadow maps",) * self.shadows)
+        lighting = before + tuple(f"light {volume}" for volume in self.volumes)
         accumulation = ("accumulation",) * (self.samples > 1)
         data = ("data gbuffer",) * (self.data_pass or not self.lit)
         return (lighting + accumulation if self.lit else ()) + data
@@ -109,7 +118,7 @@ class Plan:
 def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     """Decide. Raises UsageError for a layer that does not exist or an image without pixels."""
     _check_layers(settings.layers)
-    size = image_size(scene, settings)
+    size = image_size(scene.camera.aspect, settings.size, settings.width, scene.resolution)
     camera = scene.camera.conformed(size[0] * scene.pixel_aspect / size[1], scene.conform)
     exposure = camera.exposure * exposure_scale(settings.exposure)
     lights = _plan_lights(scene, exposure, settings)
@@ -130,20 +139,13 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         planes=planes,
         lights=lights,
         shadows=shadows,
+        background=settings.background,
         cutout=cutout,
         textures=bool(scene.textures),
         data_pass=data_pass,
+        complexity=settings.complexity,
+        levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None})),
     )
-
-
-def image_size(scene: Scene, settings: RenderSettings) -> tuple[int, int]:
-    """(width, height): the settings', else the stage's, else 1920x1080. Raises UsageError for an empty image."""
-    size = settings.size or scene.resolution or DEFAULT_SIZE
-    if settings.width is not None:
-        size = (settings.width, max(1, round(settings.width / scene.camera.aspect)))
-    if min(size) < 1:
-        raise UsageError(f"an image of {size[0]}x{size[1]} has no pixels")
-    return size
 
 
 def _check_layers(names: tuple[str, ...]) -> None:
@@ -172,8 +174,8 @@ def _tight_clip(camera: Camera, bounds: NDArray[np.float64]) -> tuple[float, flo
 
 
 def volume_of(light: Light) -> Volume:
-    """Distant light → quad; a cone of at most 90° → cone; every other light → sphere."""
-    if isinstance(light, DistantLight):
+    """Distant and dome lights → quad; a cone of at most 90° → cone; every other light → sphere."""
+    if light.is_infinite:
         return "quad"
     return "cone" if light.shaping and light.shaping.cone_angle <= 90.0 else "sphere"
 
@@ -201,7 +203,7 @@ def _peak(light: Light) -> float:
 
 
 def _reach(light: Light, bounds: NDArray[np.float64], gain: float) -> float:
-    if isinstance(light, DistantLight):
+    if light.is_infinite:
         return math.inf
     farthest = np.max(np.abs(bounds - light.position), axis=0)
     geometry = float(np.linalg.norm(farthest)) * (1.0 + _MARGIN)
@@ -210,12 +212,14 @@ def _reach(light: Light, bounds: NDArray[np.float64], gain: float) -> float:
 
 def _explain(plan: Plan) -> Iterator[Decision]:
     yield Decision("layout", plan.layout, "as asked")
+    yield _explain_subdivision(plan)
     for plane in PLANES:
         yield _kept(f"plane {plane.name}", plane in plan.planes, "a material or layer needs it", "nothing needs it")
     for volume in ("quad", "sphere", "cone"):
         count = sum(planned.volume == volume for planned in plan.lights)
         yield Decision(f"{volume} volumes", f"{count} drawn" if count else "skipped", "lights that reach geometry")
     yield _kept("shadow maps", plan.shadows, "a light casts them", "no light casts any, or none were asked")
+    yield _kept("environment", bool(plan.domes), "a dome lights the scene", "no dome")
     yield _kept("cutout", plan.cutout, "some opacity is or may be below 1", "no opacity is below 1")
     yield _kept("textures", plan.textures, "a material reads them", "no material reads any")
     if any(LAYERS[name].source != "lighting" for name in plan.layers):
@@ -223,6 +227,15 @@ def _explain(plan: Plan) -> Iterator[Decision]:
         yield _kept("data GBuffer", plan.data_pass or not plan.lit, jittered if plan.lit else "as asked", shared)
     if not plan.lit:
         yield Decision("lighting", "skipped", "no layer needs it")
+
+
+def _explain_subdivision(plan: Plan) -> Decision:
+    if not plan.levels:
+        return Decision("subdivision", "skipped", "no subdivision surface")
+    least, most = plan.levels[0], plan.levels[-1]
+    levels = f"{least} levels" if least == most else f"{least} to {most} levels"
+    reason = "by the surfaces' size in the image" if plan.complexity == "auto" else f"complexity {plan.complexity}"
+    return Decision("subdivision", levels, reason)
 
 
 def _kept(subject: str, kept: bool, why: str, why_not: str) -> Decision:

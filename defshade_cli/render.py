@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 from defshade_cli import __version__
 from defshade_cli.errors import UsageError
-from defshade_cli.farm.targets import check_outputs, frame_files, frame_paths, is_done
+from defshade_cli.farm.fingerprint import Fingerprint
+from defshade_cli.farm.targets import FINGERPRINT, check_outputs, frame_files, frame_paths, is_done, remove_leftovers
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.files import write
 from defshade_cli.image.film import Film
@@ -28,7 +30,7 @@ class FrameResult:
     """What became of one frame.
 
     paths: the files written, or found where `skipped`.  film, plan: None where skipped.
-    seconds: wall time per step: open and context (first frame only), read, plan, draw, write.
+    seconds: wall time per step: open (first frame only), read, plan, context, draw, write.
     """
 
     frame: float | None
@@ -39,9 +41,39 @@ class FrameResult:
     seconds: dict[str, float] = field(default_factory=dict)
 
 
-def run(job: RenderJob, *, command: str = "") -> Iterator[FrameResult]:
+class Renderer:
+    """The Pipelines of the devices that jobs name, each made when a frame first needs it; a context manager.
+
+    One renderer serves one job after another. Closed, it can be used again.
+    """
+
+    def __init__(self) -> None:
+        self._stack = ExitStack()
+        self._pipelines: dict[int | None, Pipeline] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def pipeline(self, device: int | None) -> Pipeline:
+        """Raises GpuError."""
+        if device not in self._pipelines:
+            self._pipelines[device] = Pipeline(self._stack.enter_context(Gpu(device)))
+        return self._pipelines[device]
+
+    def close(self) -> None:
+        self._pipelines.clear()
+        self._stack.close()
+
+
+def run(job: RenderJob, *, command: str = "", renderer: Renderer | None = None) -> Iterator[FrameResult]:
     """Render the job's frames in order, lazily. `command` goes into the files' headers.
 
+    renderer: lent for the job; without it the job has its own.
     Raises the errors of errors.py; whatever was yielded before is complete on disk.
     """
     startup: dict[str, float] = {}
@@ -49,12 +81,12 @@ def run(job: RenderJob, *, command: str = "") -> Iterator[FrameResult]:
         reader = _reader(job)
     frames = job.frames or (reader.first_frame(),)
     check_outputs(job, frames, reader.camera_name)
-    with _timed(startup, "context"):
-        gpu = Gpu(job.device)
-    with gpu:
-        pipeline = Pipeline(gpu)
+    remove_leftovers(job, frames, reader.camera_name)
+    provenance = {"version": __version__, "command": command, "stage": job.stage.name}
+    fingerprint = Fingerprint(job)
+    with nullcontext(renderer) if renderer else Renderer() as lent:
         for frame in frames:
-            result = _render_frame(job, frame, reader, pipeline, command)
+            result = _render_frame(job, frame, reader, lent, provenance, fingerprint)
             yield replace(result, seconds=startup | result.seconds)
             startup = {}
 
@@ -87,34 +119,47 @@ def render(stage: str | Path, *, camera: str | None = None, frame: float | None 
 
 
 def _reader(job: RenderJob) -> StageReader:
-    return StageReader(open_stage(job.stage), camera=job.camera, purposes=job.settings.purposes)
+    settings = job.settings
+    return StageReader(
+        open_stage(job.stage),
+        camera=job.camera,
+        purposes=settings.purposes,
+        complexity=settings.complexity,
+        size=settings.size,
+        width=settings.width,
+    )
 
 
 def _render_frame(
-    job: RenderJob, frame: float | None, reader: StageReader, pipeline: Pipeline, command: str
+    job: RenderJob,
+    frame: float | None,
+    reader: StageReader,
+    renderer: Renderer,
+    provenance: dict[str, Any],
+    fingerprint: Fingerprint,
 ) -> FrameResult:
     files = frame_files(job, frame, reader.camera_name)
-    if is_done(job, files):
+    made_of = fingerprint.of(frame) if files else ""
+    if is_done(job, files, made_of):
         return FrameResult(frame, files, skipped=True)
     seconds: dict[str, float] = {}
     with _timed(seconds, "read"):
         scene = reader.read(frame)
     with _timed(seconds, "plan"):
         plan = make_plan(scene, job.settings)
+    with _timed(seconds, "context"):
+        pipeline = renderer.pipeline(job.device)
     with _timed(seconds, "draw"):
         film = pipeline.render(scene, plan)
-    film = replace(film, metadata=_provenance(job, plan, command, seconds["draw"]))
     with _timed(seconds, "write"):
+        film = replace(film, metadata=provenance | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of})
         paths = frame_paths(job, frame, reader.camera_name)
         written = tuple(file for path in paths for file in write(film, job.output, path))
     return FrameResult(frame, written, film=film, plan=plan, seconds=seconds)
 
 
-def _provenance(job: RenderJob, plan: Plan, command: str, seconds: float) -> dict[str, Any]:
+def _cost(plan: Plan, seconds: float) -> dict[str, Any]:
     return {
-        "version": __version__,
-        "command": command,
-        "stage": job.stage.name,
         "samples": plan.samples,
         "layout": plan.layout,
         "shading": plan.shading,

@@ -9,11 +9,13 @@ from typing import Literal
 Layout = Literal["rgba8", "packed", "float"]
 Shading = Literal["preview-surface", "classic"]
 Existing = Literal["overwrite", "skip", "error"]
+Complexity = Literal["auto", "low", "medium", "high", "veryhigh"]
 Compression = Literal["zip", "zips", "piz", "dwaa", "none"]
 
 LAYOUTS: tuple[Layout, ...] = ("rgba8", "packed", "float")
 SHADINGS: tuple[Shading, ...] = ("preview-surface", "classic")
 EXISTING: tuple[Existing, ...] = ("overwrite", "skip", "error")
+COMPLEXITIES: tuple[Complexity, ...] = ("auto", "low", "medium", "high", "veryhigh")
 COMPRESSIONS: tuple[Compression, ...] = ("zip", "zips", "piz", "dwaa", "none")
 PURPOSES = ("default", "render", "proxy", "guide")
 
@@ -27,6 +29,8 @@ class RenderSettings:
     samples: jittered samples a pixel; 1 is a sample at the pixel's centre.
     exposure: stops added to the camera's own.
     shadows: False lights every surface that faces a light.
+    complexity: how finely subdivision surfaces are refined: by their size in the image, or 0 to 3 levels all alike.
+    background: dome lights are seen behind the geometry, and cover there.
     light_tolerance: scene-linear value that all dropped light together may reach in one pixel.
     """
 
@@ -40,6 +44,8 @@ class RenderSettings:
     purposes: tuple[str, ...] = ("default", "render")
     light_tolerance: float = 1e-5
     shadows: bool = True
+    complexity: Complexity = "auto"
+    background: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pxr import Sdf, Usd, UsdGeom, UsdUtils, Vt
 
 from defshade_cli.scene.geometry import Mesh
-from defshade_cli.usd.geometry import Gprim, read_gprim
+from defshade_cli.scene.scene import Unsupported
+from defshade_cli.usd.geometry import FaceGroup, Gprim, Surface, read_surface, tessellate
+from defshade_cli.usd.refiner import Refiner
 
 DEFAULT = Usd.TimeCode.Default()
 CUBE_POINTS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32)
@@ -52,14 +55,52 @@ def set_primvar(
     return primvar
 
 
-def read(schema: UsdGeom.Gprim, time: Usd.TimeCode = DEFAULT) -> Gprim:
-    gprim = read_gprim(schema.GetPrim(), time)
-    assert gprim is not None
-    return gprim
+@dataclass(frozen=True)
+class Drawn:
+    """What becomes of a prim: its surface's constants, its triangles, and the issues of both."""
+
+    surface: Surface
+    gprim: Gprim
+
+    @property
+    def mesh(self) -> Mesh:
+        return self.gprim.mesh
+
+    @property
+    def groups(self) -> tuple[FaceGroup, ...]:
+        return self.gprim.groups
+
+    @property
+    def display_color(self) -> NDArray[np.float32] | None:
+        return self.surface.display_color
+
+    @property
+    def display_opacity(self) -> float | None:
+        return self.surface.display_opacity
+
+    @property
+    def issues(self) -> tuple[Unsupported, ...]:
+        return self.surface.issues + self.gprim.issues
 
 
-def reasons(gprim: Gprim) -> list[str]:
-    return [issue.reason for issue in gprim.issues]
+def read(schema: UsdGeom.Gprim, time: Usd.TimeCode = DEFAULT, level: int = 0) -> Drawn:
+    """The prim in triangles, `level` times refined where it is a subdivision surface."""
+    drawn = try_read(schema.GetPrim(), time, level)
+    assert drawn is not None
+    return drawn
+
+
+def try_read(prim: Usd.Prim, time: Usd.TimeCode, level: int = 0) -> Drawn | None:
+    """None for a prim that is no surface."""
+    surface = read_surface(prim, time)
+    if surface is None:
+        return None
+    refiner = Refiner(surface.control, level) if surface.control and level else None
+    return Drawn(surface, tessellate(surface, refiner))
+
+
+def reasons(drawn: Drawn) -> list[str]:
+    return [issue.reason for issue in drawn.issues]
 
 
 def corners(mesh: Mesh) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ from prims import (
     CUBE_FACES,
     CUBE_POINTS,
     DEFAULT,
+    Drawn,
     area,
     define_cube,
     define_mesh,
@@ -22,16 +23,17 @@ from prims import (
     read,
     reasons,
     set_primvar,
+    try_read,
     volume,
 )
 from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
 
-from defshade_cli.usd.geometry import Gprim, is_time_varying, read_gprim
+from defshade_cli.usd.geometry import is_time_varying, read_surface
 
 TRIANGLE = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 
 
-def assert_sound(gprim: Gprim) -> None:
+def assert_sound(gprim: Drawn) -> None:
     """What every mesh keeps, whatever was authored."""
     mesh = gprim.mesh
     assert mesh.triangles.size == 0 or mesh.triangles.max() < len(mesh.points)
@@ -97,7 +99,7 @@ def test_other_types_are_not_ours() -> None:
     stage = new_stage()
     for name in ("Points", "BasisCurves", "NurbsPatch", "TetMesh", "Xform", "Camera", ""):
         prim = stage.DefinePrim(f"/other_{name}", name)
-        assert read_gprim(prim, DEFAULT) is None and not is_time_varying(prim)
+        assert read_surface(prim, DEFAULT) is None and not is_time_varying(prim)
 
 
 # Subsets
@@ -112,7 +114,7 @@ def add_subset(
     subset.CreateIndicesAttr(Vt.IntArray(faces))
 
 
-def groups_of(gprim: Gprim) -> dict[str, list[int]]:
+def groups_of(gprim: Drawn) -> dict[str, list[int]]:
     """The faces that each group draws."""
     return {
         group.path: np.unique(gprim.mesh.faces[group.first : group.first + group.count]).tolist()
@@ -318,8 +320,9 @@ def test_no_mesh_is_bad_enough_to_raise(
         primvar.SetIndices(Vt.IntArray(lookup))
     add_subset(mesh, "a", subset)
     with np.errstate(all="raise", under="ignore"):
-        gprim = read(mesh)
-    assert_sound(gprim)
+        cage, refined = read(mesh), read(mesh, level=2)
+    assert_sound(cage)
+    assert_sound(refined)
 
 
 # Stages by others
@@ -334,7 +337,7 @@ def test_every_surface_of_the_stages_by_others(assets: Path) -> None:
         prims = [*stage.Traverse(), *(p for prototype in stage.GetPrototypes() for p in Usd.PrimRange(prototype))]
         for prim in prims:
             for time in (DEFAULT, Usd.TimeCode(stage.GetStartTimeCode())):
-                gprim = read_gprim(prim, time)
+                gprim = try_read(prim, time, level=1)
                 if gprim is not None:
                     surfaces += 1
                     assert_sound(gprim)

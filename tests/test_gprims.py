@@ -7,10 +7,9 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from prims import area, corners, is_watertight, new_stage, read, reasons, set_primvar, vector_areas, volume
+from prims import Drawn, area, corners, is_watertight, new_stage, read, reasons, set_primvar, vector_areas, volume
 from pxr import Usd, UsdGeom, Vt
 
-from defshade_cli.usd.geometry import Gprim
 from defshade_cli.usd.revolution import SEGMENTS
 
 STEP = 2.0 * math.pi / SEGMENTS
@@ -189,7 +188,7 @@ def test_capsules_continue_smoothly_from_mantle_to_cap() -> None:
     np.testing.assert_allclose(mesh.normals[ring, 2], math.sin(tilt), atol=1e-6)
 
 
-def by_face(gprim: Gprim) -> NDArray:
+def by_face(gprim: Drawn) -> NDArray:
     """(F, 3) the colour of each face's first triangle."""
     _, first = np.unique(gprim.mesh.faces, return_index=True)
     return gprim.mesh.display_color[gprim.mesh.triangles[first, 0]]

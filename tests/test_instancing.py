@@ -161,7 +161,9 @@ def _arrays(count: int, draw: Callable) -> tuple[NDArray, NDArray, NDArray]:
 @given(stacks, stacks, st.data())
 def test_placing_is_the_loop_over_copies_and_instances(inner: NDArray, outer: NDArray, data: st.DataObject) -> None:
     numbered, color, opacity = _arrays(len(inner), data.draw)
-    piece = Piece(None, inner, tuple(f"/p/{i}" for i in numbered), numbered, color, opacity, None, (NOTHING_BOUND,))  # type: ignore[arg-type]
+    piece = Piece(
+        None, inner, tuple(f"/p/{i}" for i in numbered), numbered, color, opacity, None, {"/p": NOTHING_BOUND}
+    )  # type: ignore[arg-type]
     numbered, color, opacity = _arrays(len(outer), data.draw)
     roots = tuple(f"/q{i}" for i in numbered)
     (found,) = place([piece], Placement(outer, numbered, color, opacity, "render", Bindings(), False, "/p", roots))

@@ -9,7 +9,7 @@ from build import GREY, bulb, camera, drawable, quad, scene, sphere, sun
 
 from defshade_cli.errors import UsageError
 from defshade_cli.passes.view import camera_depth, clip_from_camera
-from defshade_cli.plan import image_size, make_plan
+from defshade_cli.plan import make_plan
 from defshade_cli.scene.camera import Camera
 from defshade_cli.settings import RenderSettings
 from defshade_cli.spaces import translation
@@ -65,11 +65,11 @@ def test_unknown_layers_are_named() -> None:
 
 def test_size_follows_the_settings_then_the_stage_then_the_default() -> None:
     staged = replace(SCENE, resolution=(320, 200))
-    assert image_size(staged, RenderSettings(size=(10, 20))) == (10, 20)
-    assert image_size(staged, RenderSettings()) == (320, 200)
-    assert image_size(SCENE, RenderSettings()) == (1920, 1080)
+    assert make_plan(staged, RenderSettings(size=(10, 20))).size == (10, 20)
+    assert make_plan(staged, RenderSettings()).size == (320, 200)
+    assert make_plan(SCENE, RenderSettings()).size == (1920, 1080)
     wide = replace(staged, camera=replace(SCENE.camera, window=(-1.0, 1.0, -0.5, 0.5)))
-    assert image_size(wide, RenderSettings(width=100)) == (100, 50)
+    assert make_plan(wide, RenderSettings(width=100)).size == (100, 50)
 
 
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])

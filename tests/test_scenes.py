@@ -12,13 +12,13 @@ import pytest
 from defshade_cli import resources
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.measure.error import RelativeError, relative_error
-from defshade_cli.measure.layouts import first_frame, layout_errors, layout_table, replace_generated
+from defshade_cli.measure.layouts import first_frame, layout_errors, layout_table, referenced_stages, replace_generated
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import LAYOUTS, SHADINGS, RenderSettings, Shading
 
-STAGES = sorted(path.stem for path in resources.SCENES.glob("*.usda"))
+STAGES = [path.stem for path in referenced_stages()]
 SIZE = (160, 90)
 
 MEDIAN_BOUND = {"float": 1e-4, "packed": 0.0155, "rgba8": 0.037}

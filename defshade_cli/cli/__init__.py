@@ -1,8 +1,9 @@
 """The command line: the only package that speaks click and rich.
 
     options    what commands share, and the RenderJob it becomes
-    render gbuffer inspect compare doctor    one command each
+    render gbuffer batch inspect compare doctor    one command each
     progress   the ways of telling how far a job is    stats    the record that --stats writes
+    jobfile tally table    what batch reads, counts and shows
     reference  docs/commands.md, from the commands themselves
 
 A command builds a job, calls one function and prints: results to stdout; progress, logs and errors to stderr.
@@ -16,6 +17,7 @@ import sys
 import click
 
 from defshade_cli import __version__
+from defshade_cli.cli.batch import batch
 from defshade_cli.cli.compare import compare
 from defshade_cli.cli.doctor import doctor
 from defshade_cli.cli.gbuffer import gbuffer
@@ -28,7 +30,7 @@ INTERRUPTED = 130  # 128 + SIGINT, as shells have it
 _HELP = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
 _CODES = """\b
 Exit codes: 0 done, 1 compare over the threshold, 2 usage, 3 the stage, 4 the GPU, 5 a file,
-6 some frames of a batch failed, 130 interrupted."""
+6 some frames of a batch failed, 130 interrupted, 143 terminated."""
 
 
 @click.group(context_settings=_HELP, epilog=_CODES, invoke_without_command=True)
@@ -44,7 +46,7 @@ def defshade(context: click.Context) -> None:
         context.exit(UsageError.exit_code)
 
 
-for command in (render, gbuffer, inspect, compare, doctor):
+for command in (render, gbuffer, batch, inspect, compare, doctor):
     defshade.add_command(command)
 
 

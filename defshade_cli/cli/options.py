@@ -58,7 +58,7 @@ class HeadedCommand(click.Command):
 
 def takes_stage(function: Function) -> Function:
     """Give a command the options of stage and image: it is called with a RenderJob and its own keywords."""
-    return _takes([*_stage_options(), *_image_options(_RENDER.layers)], function)
+    return _takes([_scene_argument(), *_stage_options(), *_image_options(_RENDER.layers)], function)
 
 
 def takes_job(*, layers: Sequence[str] = _RENDER.layers, name: str = "{scene}") -> Callable[[Function], Function]:
@@ -70,11 +70,16 @@ def takes_job(*, layers: Sequence[str] = _RENDER.layers, name: str = "{scene}") 
     def decorate(function: Function) -> Function:
         @functools.wraps(function)
         def command(job: RenderJob, **values: Any) -> Any:
-            return function(_with_output(job, name), Reporting(**_take(values, Reporting)), **values)
+            return function(with_output(job, name), Reporting(**take(values, Reporting)), **values)
 
-        return _takes([*_stage_options(), *_image_options(layers), *_output_options(name), *_run_options()], command)
+        return _takes([_scene_argument(), *render_options(layers, name)], command)
 
     return decorate
+
+
+def render_options(layers: Sequence[str] = _RENDER.layers, name: str = "{scene}") -> list[Function]:
+    """Every option of a render, with the defaults that takes_job tells of."""
+    return [*_stage_options(), *_image_options(layers), *_output_options(name), *_run_options()]
 
 
 def epilog(*examples: str, layers: bool = False) -> str:
@@ -89,7 +94,7 @@ def epilog(*examples: str, layers: bool = False) -> str:
 def _takes(options: list[Function], function: Function) -> Function:
     @functools.wraps(function)
     def command(**values: Any) -> Any:
-        job = _make_job(values)
+        job = make_job(values)
         return function(job, **values)
 
     for option in reversed(options):
@@ -97,7 +102,7 @@ def _takes(options: list[Function], function: Function) -> Function:
     return command
 
 
-def _make_job(values: dict[str, Any]) -> RenderJob:
+def make_job(values: dict[str, Any]) -> RenderJob:
     """The RenderJob in a command's `values`, which keep only what is the command's own."""
     if values["size"] and values["width"]:
         raise UsageError("--size and --width exclude each other")
@@ -107,27 +112,30 @@ def _make_job(values: dict[str, Any]) -> RenderJob:
     values["frames"] = (None,) if default_time else values["frames"] or ()
     return RenderJob(
         stage=values.pop("scene"),
-        settings=RenderSettings(**_take(values, RenderSettings)),
-        output=OutputSettings(**_take(values, OutputSettings)),
-        **_take(values, RenderJob),
+        settings=RenderSettings(**take(values, RenderSettings)),
+        output=OutputSettings(**take(values, OutputSettings)),
+        **take(values, RenderJob),
     )
 
 
-def _take(values: dict[str, Any], owner: Any) -> dict[str, Any]:
+def take(values: dict[str, Any], owner: Any) -> dict[str, Any]:
     """Those of `values` that are fields of the dataclass `owner`, removed from `values`."""
     return {name: values.pop(name) for name in owner.__dataclass_fields__ if name in values}
 
 
-def _with_output(job: RenderJob, name: str) -> RenderJob:
+def with_output(job: RenderJob, name: str) -> RenderJob:
     """`job` with the default file name where the user gave none."""
     patterns = job.output.patterns or (f"{name}.####.exr" if len(job.frames) > 1 else f"{name}.exr",)
     return replace(job, output=replace(job.output, patterns=patterns))
 
 
+def _scene_argument() -> Function:
+    return click.argument("scene", type=click.Path(path_type=Path))
+
+
 def _stage_options() -> list[Function]:
     option = functools.partial(click.option, cls=Option, heading="Stage")
     return [
-        click.argument("scene", type=click.Path(path_type=Path)),
         option(
             "--camera",
             metavar="PATH|NAME",
@@ -197,12 +205,26 @@ def _image_options(layers: Sequence[str]) -> list[Function]:
             help="Whether geometry hides lights.",
         ),
         option(
+            "--background/--no-background",
+            default=_RENDER.background,
+            default_text="--background",
+            help="Whether dome lights are seen behind the geometry.",
+        ),
+        option(
             "--gbuffer",
             "layout",
             type=click.Choice(settings.LAYOUTS),
             default=_RENDER.layout,
             default_text=str(_RENDER.layout),
             help="Encoding of the GBuffer that lighting reads; data layers are always read as float.",
+        ),
+        option(
+            "--complexity",
+            type=click.Choice(settings.COMPLEXITIES),
+            default=_RENDER.complexity,
+            default_text=str(_RENDER.complexity),
+            help="Refinement of subdivision surfaces: auto goes by their size in the image; low draws their cages, "
+            "medium, high and veryhigh one, two and three levels.",
         ),
         option(
             "--exposure",

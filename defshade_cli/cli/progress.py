@@ -18,6 +18,7 @@ from defshade_cli.cli.options import Reporting
 from defshade_cli.errors import DefshadeError
 
 if TYPE_CHECKING:
+    from defshade_cli.farm.tasks import Outcome
     from defshade_cli.render import FrameResult
 
 
@@ -37,10 +38,15 @@ class Progress:
         if isinstance(error, DefshadeError):
             self.failed(error)
 
-    def frame(self, result: FrameResult) -> None:
+    def frame(self, result: FrameResult | Outcome) -> None:
         """One more frame is done."""
         self.done += 1
         self.finished(result)
+
+    def frame_failed(self, outcome: Outcome) -> None:
+        """One more frame of a batch has failed, for good."""
+        self.done += 1
+        self.lost(outcome)
 
     @property
     def percent(self) -> float:
@@ -48,7 +54,9 @@ class Progress:
 
     def started(self) -> None: ...
 
-    def finished(self, result: FrameResult) -> None: ...
+    def finished(self, result: FrameResult | Outcome) -> None: ...
+
+    def lost(self, outcome: Outcome) -> None: ...
 
     def failed(self, error: DefshadeError) -> None: ...
 
@@ -56,10 +64,13 @@ class Progress:
 class Lines(Progress):
     """A line a frame, for logs."""
 
-    def finished(self, result: FrameResult) -> None:
+    def finished(self, result: FrameResult | Outcome) -> None:
         paths = ", ".join(map(str, result.paths))
         cost = "skipped" if result.skipped else f"{sum(result.seconds.values()):.2f} s"
         _say(f"frame {frame_name(result.frame)}  → {paths}  {cost}")
+
+    def lost(self, outcome: Outcome) -> None:
+        _say(failure(outcome))
 
 
 class Alf(Progress):
@@ -68,7 +79,11 @@ class Alf(Progress):
     def started(self) -> None:
         _say("ALF_PROGRESS 0%")
 
-    def finished(self, result: FrameResult) -> None:
+    def finished(self, result: FrameResult | Outcome) -> None:
+        _say(f"ALF_PROGRESS {int(self.percent)}%")
+
+    def lost(self, outcome: Outcome) -> None:
+        _say(failure(outcome))
         _say(f"ALF_PROGRESS {int(self.percent)}%")
 
 
@@ -76,23 +91,31 @@ class OpenJd(Progress):
     def started(self) -> None:
         _say("openjd_progress: 0.0")
 
-    def finished(self, result: FrameResult) -> None:
+    def finished(self, result: FrameResult | Outcome) -> None:
         _say(f"openjd_progress: {self.percent:.1f}")
         _say(f"openjd_status: frame {frame_name(result.frame)}, {self.done} of {self.total}")
+
+    def lost(self, outcome: Outcome) -> None:
+        _say(f"openjd_progress: {self.percent:.1f}")
+        _say(f"openjd_status: {failure(outcome)}")
 
     def failed(self, error: DefshadeError) -> None:
         _say(f"openjd_fail: {error}")
 
 
 class JsonLines(Progress):
-    """One object a line: started, frame, failed."""
+    """One object a line: started, frame, frame_failed, failed."""
 
     def started(self) -> None:
         self._event("started")
 
-    def finished(self, result: FrameResult) -> None:
+    def finished(self, result: FrameResult | Outcome) -> None:
         paths = [str(path) for path in result.paths]
         self._event("frame", frame=result.frame, paths=paths, skipped=result.skipped, seconds=result.seconds)
+
+    def lost(self, outcome: Outcome) -> None:
+        stage = str(outcome.stage)
+        self._event("frame_failed", stage=stage, frame=outcome.frame, message=outcome.error, log=outcome.log)
 
     def failed(self, error: DefshadeError) -> None:
         self._event("failed", message=str(error), exit_code=error.exit_code)
@@ -133,7 +156,7 @@ class Bar(Progress):
     ) -> None:
         self._bar.stop()
 
-    def finished(self, result: FrameResult) -> None:
+    def finished(self, result: FrameResult | Outcome) -> None:
         self._bar.update(self._task, completed=self.done, description=f"frame {frame_name(result.frame)}")
 
 
@@ -144,12 +167,12 @@ class _Echo(logging.Handler):
         _say(f"defshade: {record.levelname.lower()}: {record.getMessage()}")
 
 
-def make_progress(reporting: Reporting, total: int) -> Progress:
-    """The Progress that the options ask for, for `total` frames."""
-    kinds = {"bar": Bar, "alf": Alf, "openjd": OpenJd, "json": JsonLines, "none": Progress}
+def make_progress(reporting: Reporting, total: int, bar: type[Progress] = Bar) -> Progress:
+    """The Progress that the options ask for, for `total` frames. bar: the one for terminals."""
+    kinds = {"bar": bar, "alf": Alf, "openjd": OpenJd, "json": JsonLines, "none": Progress}
     if reporting.quiet:
         return Progress(total)
-    automatic = Bar if sys.stderr.isatty() else Lines
+    automatic = bar if sys.stderr.isatty() else Lines
     return kinds.get(reporting.progress, automatic)(total)
 
 
@@ -166,6 +189,11 @@ def frame_name(frame: float | None) -> str:
     if frame is None:
         return "default"
     return str(int(frame)) if frame == int(frame) else str(frame)
+
+
+def failure(outcome: Outcome) -> str:
+    """`frame 7 of shot.usda failed: its reason`."""
+    return f"frame {frame_name(outcome.frame)} of {outcome.stage} failed: {outcome.error}"
 
 
 def _say(line: str) -> None:

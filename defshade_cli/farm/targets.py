@@ -9,10 +9,13 @@ from defshade_cli.errors import OutputError, UsageError
 from defshade_cli.farm.names import expand, has_frame_token
 from defshade_cli.image.colour import resolve_view
 from defshade_cli.image.encoders import EXR, suffix_of
-from defshade_cli.image.files import check_writable, targets
+from defshade_cli.image.files import check_writable, read_header, remove_abandoned, targets
 from defshade_cli.settings import RenderJob
 
 Frames = Sequence[float | None]
+
+FINGERPRINT = "fingerprint"
+"""The name of farm.fingerprint's text in a file's header, among the provenance."""
 
 
 def frame_paths(job: RenderJob, frame: float | None, camera: str) -> tuple[Path, ...]:
@@ -45,9 +48,28 @@ def check_outputs(job: RenderJob, frames: Frames, camera: str) -> None:
         check_writable(folder_file)
 
 
-def is_done(job: RenderJob, files: Sequence[Path]) -> bool:
-    """May the frame of `files` be skipped? Raises OutputError where one exists and must not."""
+def remove_leftovers(job: RenderJob, frames: Frames, camera: str) -> None:
+    """Clear the folders of the job's files of what killed renders left half written. Raises OutputError."""
+    for folder in {file.parent for frame in frames for file in frame_files(job, frame, camera)}:
+        remove_abandoned(folder)
+
+
+def is_done(job: RenderJob, files: Sequence[Path], fingerprint: str) -> bool:
+    """May the frame of `files` be skipped? Only where every file says that it was made of the same.
+
+    Raises OutputError where a file exists and must not.
+    """
     existing = [file for file in files if file.exists()]
     if existing and job.output.existing == "error":
         raise OutputError(f"{existing[0]} exists, and --existing error was asked")
-    return bool(files) and job.output.existing == "skip" and len(existing) == len(files)
+    if job.output.existing != "skip" or not fingerprint or len(existing) < len(files):
+        return False
+    return all(_fingerprint_in(file) == fingerprint for file in files)
+
+
+def _fingerprint_in(file: Path) -> str | None:
+    """What the header says; None where it says nothing, or cannot be read, for then the file is not a finished one."""
+    try:
+        return read_header(file).get(FINGERPRINT)
+    except OutputError:
+        return None

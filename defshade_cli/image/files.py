@@ -10,6 +10,8 @@ A file appears whole or not at all: it is written beside its target under a hidd
 from __future__ import annotations
 
 import os
+import re
+import socket
 import tempfile
 import threading
 from collections.abc import Iterable, Iterator
@@ -86,9 +88,37 @@ def read_header(path: Path) -> dict[str, Any]:
     return read_provenance((entry.name, entry.value) for entry in source.spec().extra_attribs)
 
 
+def remove_abandoned(folder: Path) -> None:
+    """Remove what writers that are dead left half written in a folder: those of this machine, whose processes we know.
+
+    Raises OutputError.
+    """
+    name = re.compile(rf"{re.escape(_hidden_prefix())}(\d+)-[0-9a-f]+\.\w+")
+    try:
+        for path in folder.iterdir() if folder.is_dir() else ():
+            if (match := name.fullmatch(path.name)) and not _is_alive(int(match[1])):
+                path.unlink(missing_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: {_reason(error)}") from error
+
+
+def _hidden_prefix() -> str:
+    return f".{socket.gethostname()}-"
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # somebody else's
+        return True
+    return True
+
+
 @contextmanager
 def _appearing_at(path: Path) -> Iterator[Path]:
-    hidden = path.with_name(f".{os.getpid()}-{threading.get_ident():x}{path.suffix}")
+    hidden = path.with_name(f"{_hidden_prefix()}{os.getpid()}-{threading.get_ident():x}{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:

@@ -69,8 +69,13 @@ def replace_generated(page: str, name: str, content: str) -> str:
     return section.sub(lambda match: f"{match[1]}{content}\n{match[2]}", page)
 
 
+def referenced_stages() -> list[Path]:
+    """The stages that the float64 reference covers: lights with a position or a direction, not skies."""
+    return sorted(path for path in resources.SCENES.glob("*.usda") if path.stem != "light_dome")
+
+
 def main(page: Path) -> None:
-    stages = sorted(resources.SCENES.glob("*.usda"))
+    stages = referenced_stages()
     with Gpu() as gpu:
         pipeline = Pipeline(gpu)
         settings = RenderSettings(size=SIZE, shadows=False)

@@ -9,13 +9,17 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.image.environment import sky_of
 from defshade_cli.passes.sampling import Sample
 from defshade_cli.passes.shadows import CAPACITY, ShadowExtent, shadow_cameras
 from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.scene.camera import Camera
-from defshade_cli.scene.emission import Emitter, emitter_at, far_field
-from defshade_cli.scene.light import DistantLight
+from defshade_cli.scene.emission import Emitter, emitter_at, far_field, sky_emitter
+from defshade_cli.scene.light import DomeLight, Light
 from defshade_cli.scene.scene import Scene
+
+DOME_DIRECTIONS = 4
+"""Directions of a dome in one sample, each with a shadow map of its own."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,14 +37,25 @@ def light_batches(scene: Scene, plan: Plan, sample: Sample) -> Iterator[list[Lit
     batch: list[LitSample] = []
     used = 0
     for number, planned in enumerate(plan.lights):
-        lit = _lit_sample(number, planned, plan, sample, extent)
-        if used + len(lit.shadow_cameras) > CAPACITY:
-            yield batch
-            batch, used = [], 0
-        batch.append(lit)
-        used += len(lit.shadow_cameras)
+        for emitter in _emitters(number, planned.light, plan, sample):
+            lit = _lit_sample(planned, emitter, plan, extent)
+            if used + len(lit.shadow_cameras) > CAPACITY:
+                yield batch
+                batch, used = [], 0
+            batch.append(lit)
+            used += len(lit.shadow_cameras)
     if batch:
         yield batch
+
+
+def _emitters(number: int, light: Light, plan: Plan, sample: Sample) -> list[Emitter]:
+    """One for most lights; some directions for a dome, and none where its analytic term stands in for them."""
+    if isinstance(light, DomeLight):
+        if plan.samples == 1:
+            return []
+        places = (sample.on_light(number, k, DOME_DIRECTIONS) for k in range(DOME_DIRECTIONS))
+        return [sky_emitter(light, sky_of(light), u, 1.0 / DOME_DIRECTIONS) for u in places]
+    return [far_field(light) if plan.samples == 1 else emitter_at(light, sample.on_light(number))]
 
 
 def shadow_extent(bounds: NDArray[np.float64], plan: Plan) -> ShadowExtent:
@@ -59,11 +74,10 @@ def _corners(box: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array(list(product(*box.T)))
 
 
-def _lit_sample(number: int, planned: PlannedLight, plan: Plan, sample: Sample, extent: ShadowExtent) -> LitSample:
+def _lit_sample(planned: PlannedLight, emitter: Emitter, plan: Plan, extent: ShadowExtent) -> LitSample:
     light = planned.light
-    emitter = far_field(light) if plan.samples == 1 else emitter_at(light, sample.on_light(number))
     if not (plan.shadows and light.casts_shadow):
         return LitSample(planned, emitter, ())
     relative = emitter.relative_to(plan.camera.position)
-    cameras = shadow_cameras(relative, light.shaping, extent, distant=isinstance(light, DistantLight))
+    cameras = shadow_cameras(relative, light.shaping, extent, distant=light.is_infinite)
     return LitSample(planned, emitter, cameras)

@@ -13,6 +13,7 @@ from defshade_cli.gpu.targets import Target
 from defshade_cli.image.film import Film
 from defshade_cli.passes.accumulation import AccumulationPass
 from defshade_cli.passes.emitters import light_batches
+from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
 from defshade_cli.passes.lighting import LightingPass, LightingVariant, light_records
@@ -34,6 +35,7 @@ class Pipeline:
         self._lights = RecordBuffer(gpu, LIGHTS)
         self._gbuffer_pass = cache(lambda variant: GBufferPass(gpu, variant))
         self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant))
+        self._environment_pass = cache(lambda variant: EnvironmentPass(gpu, variant))
         self._shadow_pass = cache(
             lambda cutout, color_varies, texture_groups: ShadowPass(
                 gpu, cutout=cutout, color_varies=color_varies, texture_groups=texture_groups
@@ -80,6 +82,8 @@ class Pipeline:
         """One sample of every light: as many at a time as the shadow atlas holds."""
         lighting = self._lighting_pass(LightingVariant.of(plan))
         lighting.begin(gbuffer, radiance)
+        for dome in plan.domes:
+            self._environment_pass(EnvironmentVariant.of(plan)).draw(dome, gbuffer, radiance)
         for batch in light_batches(scene, plan, sample):
             shadows = None
             if plan.shadows:

@@ -29,9 +29,9 @@ class Sample:
         """From a texel's centre, in texels."""
         return self.texel[0] - 0.5, self.texel[1] - 0.5
 
-    def on_light(self, number: int) -> Pair:
-        """The place on the number-th light."""
-        return owen_sobol(self.index, _LIGHTS + number)
+    def on_light(self, number: int, k: int = 0, of: int = 1) -> Pair:
+        """The k-th of some places on the number-th light."""
+        return owen_sobol(self.index * of + k, _LIGHTS + number)
 
 
 CENTRE = Sample(0, (0.5, 0.5), (0.5, 0.5), (0.5, 0.5))

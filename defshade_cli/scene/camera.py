@@ -8,10 +8,32 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.errors import UsageError
 from defshade_cli.scene.arrays import frozen
 from defshade_cli.spaces import ConformPolicy, Matrix, Window, conform_window, inverse_rigid
 
 Projection = Literal["perspective", "orthographic"]
+
+
+DEFAULT_SIZE = (1920, 1080)
+
+
+def image_size(
+    aspect: float,
+    asked: tuple[int, int] | None = None,
+    width: int | None = None,
+    authored: tuple[int, int] | None = None,
+) -> tuple[int, int]:
+    """(width, height): as asked, else the stage's, else 1920x1080; a width alone takes the camera's `aspect`.
+
+    Raises UsageError for an image without pixels.
+    """
+    size = asked or authored or DEFAULT_SIZE
+    if width is not None:
+        size = (width, max(1, round(width / aspect)))
+    if min(size) < 1:
+        raise UsageError(f"an image of {size[0]}x{size[1]} has no pixels")
+    return size
 
 
 @dataclass(frozen=True, slots=True, eq=False)

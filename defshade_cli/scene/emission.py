@@ -13,10 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.scene.environment import Environment
 from defshade_cli.scene.light import (
     CylinderLight,
     DiskLight,
     DistantLight,
+    DomeLight,
     Light,
     Profile,
     RectLight,
@@ -73,6 +75,13 @@ def emitter_at(light: Light, u: tuple[float, float]) -> Emitter:
     intensity = light.radiance * (patch.area * stretch)
     position = transform_points(light.world_from_light, patch.point)
     return Emitter(position, light.axis, normalize(cofactor), "cosine", intensity)
+
+
+def sky_emitter(light: DomeLight, sky: Environment, u: tuple[float, float], share: float) -> Emitter:
+    """A direction of the dome drawn by its sky's radiance, bearing `share` of the whole."""
+    direction, weight = sky.sample(u)
+    axis = -normalize(light.world_from_light[:3, :3] @ direction)
+    return Emitter(light.position, axis, axis, "uniform", light.emission * weight * share)
 
 
 def _distant(light: DistantLight, u: tuple[float, float]) -> Emitter:

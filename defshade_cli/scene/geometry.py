@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ class Mesh:
     display_opacity: (V,) float32 likewise.
     double_sided: as authored. Both sides are drawn either way.
     uvs: primvar name → (V, 2) float32 texture coordinates, (0, 0) at the lower left of an image.
+    level: how often a subdivision surface was refined; None for what is no such surface.
     """
 
     path: str
@@ -36,6 +38,7 @@ class Mesh:
     display_opacity: NDArray[np.float32] | None = None
     double_sided: bool = False
     uvs: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
+    level: int | None = None
 
     def __post_init__(self) -> None:
         count = len(self.points)
@@ -59,6 +62,23 @@ class Mesh:
         if not len(used):
             return np.array([[np.inf] * 3, [-np.inf] * 3])
         return np.stack([used.min(axis=0), used.max(axis=0)])
+
+
+def world_boxes(box: NDArray[np.float64], world_from_object: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 2, 3) boxes around an object-space box (2, 3) placed by matrices (N, 4, 4); NaN where not finite."""
+    if not np.isfinite(box).all():
+        return np.full((len(world_from_object), 2, 3), np.nan)
+    corners = np.array(list(product(*box.T)))
+    linear, offset = world_from_object[:, :3, :3], world_from_object[:, None, :3, 3]
+    placed = corners @ linear.transpose(0, 2, 1) + offset
+    return np.stack([placed.min(axis=1), placed.max(axis=1)], axis=1)
+
+
+def enclose(boxes: Iterable[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """(2, 3) the box around boxes (N, 2, 3), those that are not finite left out; (+inf, −inf) around nothing."""
+    finite = [some[np.isfinite(some).all(axis=(1, 2))] for some in boxes]
+    stacked = np.concatenate([np.empty((0, 2, 3)), *finite])
+    return np.stack([stacked[:, 0].min(axis=0, initial=np.inf), stacked[:, 1].max(axis=0, initial=-np.inf)])
 
 
 @dataclass(frozen=True, slots=True)

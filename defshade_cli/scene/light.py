@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.scene.arrays import frozen
+from defshade_cli.scene.environment import Environment
 from defshade_cli.spaces import Matrix, normalize
 
 Profile = Literal["uniform", "cosine", "sine"]
@@ -60,6 +61,7 @@ class Light:
     casts_shadow: bool = True
 
     kind: ClassVar[str]
+    is_infinite: ClassVar[bool] = False
     profile: ClassVar[Profile] = "uniform"
 
     def __post_init__(self) -> None:
@@ -108,6 +110,7 @@ class DistantLight(Light):
 
     angle: float = 0.53
     kind = "distant"
+    is_infinite = True
 
     @property
     def size_factor(self) -> float:
@@ -121,6 +124,24 @@ class DistantLight(Light):
     def irradiance(self) -> NDArray[np.float64]:
         """(3,) lux on a surface that faces the light."""
         return self.emission * self.power_scale
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DomeLight(Light):
+    """Light from all around; `normalize` does not concern it.
+
+    texture: file of the sky's latitude-longitude image, None for an even one.
+    environment: the sky itself where it is not a file's, in light space.
+    """
+
+    texture: str | None = None
+    environment: Environment | None = None
+    kind = "dome"
+    is_infinite = True
+
+    @property
+    def size_factor(self) -> float:
+        return 1.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

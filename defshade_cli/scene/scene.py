@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.scene.camera import Camera
-from defshade_cli.scene.geometry import Drawable, Mesh
+from defshade_cli.scene.geometry import Drawable, Mesh, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.texture import Texture
@@ -53,19 +52,7 @@ class Scene:
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
         """(2, 3) world-space box around every drawable; (+inf, −inf) for a scene without geometry."""
-        corners = [self._world_corners(drawable) for drawable in self.drawables]
-        corners = [c[np.isfinite(c).all(axis=1)] for c in corners]
-        corners = [c for c in corners if len(c)]
-        if not corners:
-            return np.array([[np.inf] * 3, [-np.inf] * 3])
-        return np.stack([np.min([c.min(0) for c in corners], 0), np.max([c.max(0) for c in corners], 0)])
-
-    def _world_corners(self, drawable: Drawable) -> NDArray[np.float64]:
-        box = np.array(list(product(*self.meshes[drawable.mesh].bounds.T)))
-        if not np.isfinite(box).all():
-            return np.empty((0, 3))
-        linear, offset = drawable.world_from_object[:, :3, :3], drawable.world_from_object[:, None, :3, 3]
-        return (box @ linear.transpose(0, 2, 1) + offset).reshape(-1, 3)
+        return enclose(world_boxes(self.meshes[d.mesh].bounds, d.world_from_object) for d in self.drawables)
 
     @cached_property
     def textures(self) -> tuple[Texture, ...]:

@@ -1,11 +1,12 @@
 """Any surface prim of a stage as one triangulated scene.Mesh.
 
-prim ── mesh | gprims ──→ Polygons ── normals ──→ Polygons ── triangulation ──→ Mesh ── subsets ──→ Gprim
+prim ── mesh | gprims ──→ Polygons ──→ Surface      what is authored, read once
+Surface ── refiner ── normals ── triangulation ── subsets ──→ Gprim      as finely as the picture needs
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeGuard
 
 import numpy as np
@@ -14,60 +15,97 @@ from pxr import Usd, UsdGeom
 
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.scene.scene import Unsupported
+from defshade_cli.usd.control import CONTROL_ATTRIBUTES, Control, read_control
 from defshade_cli.usd.gprims import read_solid, size_attributes
 from defshade_cli.usd.mesh import MESH_ATTRIBUTES, read_mesh
 from defshade_cli.usd.normals import with_normals
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.primvars import find_display, find_uvs
-from defshade_cli.usd.subsets import FaceGroup, group_faces, material_subsets
+from defshade_cli.usd.refiner import Refiner
+from defshade_cli.usd.subsets import FaceGroup, Faces, material_subsets, read_faces
 from defshade_cli.usd.triangulation import triangulate
 
-__all__ = ["FaceGroup", "Gprim", "is_time_varying", "read_gprim"]
+__all__ = ["FaceGroup", "Gprim", "Surface", "is_time_varying", "read_surface", "tessellate"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Gprim:
-    """A surface prim at one time, in object space.
+class Surface:
+    """A surface prim at one time, in object space, before it is cut into triangles.
 
-    mesh: triangles sorted so that each group is one run.
-    groups: cover every triangle, in order; none is empty.
+    path: by which the prim is known.
+    polygons: the surface, or the cage that `control` makes one of.
+    faces: which material group each authored face is in.
     display_color: (3,) float32, the constant authored or inherited value; None where there is none, or where it
-        varies and mesh.display_color has it. display_opacity likewise.
+        varies and lies on the polygons. display_opacity likewise.
+    groups: paths of the material groups that have faces to draw, in order.
     issues: what was left out or mended of this prim, and why.
     """
 
-    mesh: Mesh
-    groups: tuple[FaceGroup, ...]
+    path: str
+    polygons: Polygons
+    control: Control | None
+    faces: Faces
+    groups: tuple[str, ...]
+    double_sided: bool
     display_color: NDArray[np.float32] | None
     display_opacity: float | None
     issues: tuple[Unsupported, ...]
 
 
-def read_gprim(prim: Usd.Prim, time: Usd.TimeCode) -> Gprim | None:
+@dataclass(frozen=True, slots=True, eq=False)
+class Gprim:
+    """A surface as triangles.
+
+    mesh: triangles sorted so that each group is one run.
+    groups: cover every triangle, in the order of Surface.groups; those that refinement left empty are missing.
+    issues: what was mended on the way, and why.
+    """
+
+    mesh: Mesh
+    groups: tuple[FaceGroup, ...]
+    issues: tuple[Unsupported, ...]
+
+
+def read_surface(prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
     """The surface of `prim`; None for a type that is no supported surface. Bad data becomes issues, never raises.
 
-    A surface of which nothing can be drawn has a mesh without triangles, no groups, and issues that say why.
+    A surface of which nothing can be drawn has no groups, and issues that say why.
     """
     issues: list[str] = []
+    path = str(prim.GetPath())
     polygons = _read_polygons(prim, time, issues)
     if polygons is None:
         return None
-    polygons = with_normals(polygons).without_holes().joined()
-    mesh = _to_mesh(prim, polygons, issues)
-    mesh, groups = group_faces(mesh, prim, time, issues)
-    color, opacity = _constant(polygons.display_color), _constant(polygons.display_opacity)
-    return Gprim(
-        mesh=mesh,
-        groups=groups,
-        display_color=color,
+    control = read_control(UsdGeom.Mesh(prim), polygons, time, issues) if prim.IsA(UsdGeom.Mesh) else None
+    faces = read_faces(prim, time, issues)
+    opacity = _constant(polygons.display_opacity)
+    return Surface(
+        path=path,
+        polygons=polygons,
+        control=control,
+        faces=faces,
+        groups=faces.groups_of(polygons.without_holes().faces),
+        double_sided=bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get()),
+        display_color=_constant(polygons.display_color),
         display_opacity=None if opacity is None else float(opacity),
-        issues=tuple(Unsupported(mesh.path, issue) for issue in issues),
+        issues=tuple(Unsupported(path, issue) for issue in issues),
     )
 
 
+def tessellate(surface: Surface, refiner: Refiner | None = None) -> Gprim:
+    """The surface in triangles; without a refiner its cage."""
+    issues: list[str] = []
+    polygons = refiner.refine(surface.polygons) if refiner else surface.polygons
+    mesh = _to_mesh(surface, with_normals(polygons).without_holes().joined(), issues)
+    if surface.control:
+        mesh = replace(mesh, level=refiner.level if refiner else 0)
+    mesh, groups = surface.faces.sort(mesh)
+    return Gprim(mesh, groups, tuple(Unsupported(surface.path, issue) for issue in issues))
+
+
 def is_time_varying(prim: Usd.Prim) -> bool:
-    """Does anything that read_gprim reads, primvars inherited and face subsets included, differ over time?"""
-    names = MESH_ATTRIBUTES if prim.IsA(UsdGeom.Mesh) else size_attributes(prim)
+    """Does anything that read_surface reads, primvars inherited and face subsets included, differ over time?"""
+    names = MESH_ATTRIBUTES + CONTROL_ATTRIBUTES if prim.IsA(UsdGeom.Mesh) else size_attributes(prim)
     primvars = (
         UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals"),
         find_display(prim, "displayColor"),
@@ -85,7 +123,7 @@ def _read_polygons(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> Pol
     return read_solid(prim, time, issues)
 
 
-def _to_mesh(prim: Usd.Prim, polygons: Polygons, issues: list[str]) -> Mesh:
+def _to_mesh(surface: Surface, polygons: Polygons, issues: list[str]) -> Mesh:
     """Triangles over the points, or over the corners where something on the mesh splits points."""
     corners, face = triangulate(polygons, issues)
     if polygons.left_handed:
@@ -95,14 +133,14 @@ def _to_mesh(prim: Usd.Prim, polygons: Polygons, issues: list[str]) -> Mesh:
     split = any(primvar.splits_points for primvar in polygons.primvars)
     place = polygons.at_corners if split else polygons.at_points
     return Mesh(
-        path=str(prim.GetPath()),
+        path=surface.path,
         points=polygons.points[polygons.indices] if split else polygons.points,
         normals=place(normals),
         triangles=(corners if split else polygons.indices[corners]).astype(np.uint32),
         faces=polygons.faces[face],
         display_color=place(color) if _varies(color) else None,
         display_opacity=place(opacity) if _varies(opacity) else None,
-        double_sided=bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get()),
+        double_sided=surface.double_sided,
         uvs={name: place(uv) for name, uv in polygons.uvs.items()},
     )
 

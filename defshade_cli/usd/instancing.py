@@ -9,8 +9,8 @@ NaN in arrays) and multiplies its matrices, in NumPy: instances of instances cos
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from itertools import chain, repeat
 from typing import NamedTuple
 
@@ -20,7 +20,7 @@ from pxr import Gf, Usd
 
 from defshade_cli.scene.light import Light
 from defshade_cli.usd.binding import NOTHING_BOUND, Bindings
-from defshade_cli.usd.geometry import Gprim
+from defshade_cli.usd.geometry import Surface
 from defshade_cli.usd.primvars import read_display
 from defshade_cli.usd.xform import IDENTITY
 
@@ -35,23 +35,23 @@ class Standing(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Piece:
-    """A gprim or a light where it stands in a subtree, N times.
+    """A surface or a light where it stands in a subtree, N times.
 
     root_from_object: (N, 4, 4) float64; world space where `in_world`, because the prim resets its xform stack.
     paths: of each, or one that all share.
     ids: (N,) int32 as Drawable.instance_ids; the outermost instance counts.
-    bindings: of each group of a gprim.
+    bindings: of each group of a surface, by the group's path.
     display_color, display_opacity: (N, 3) and (N,) float32.
     """
 
-    content: Gprim | Light
+    content: Surface | Light
     root_from_object: NDArray[np.float64]
     paths: tuple[str, ...]
     ids: NDArray[np.int32]
     display_color: NDArray[np.float32]
     display_opacity: NDArray[np.float32]
     purpose: str | None = None
-    bindings: tuple[Bindings, ...] = ()
+    bindings: Mapping[str, Bindings] = field(default_factory=dict)
     in_world: bool = False
 
 
@@ -84,7 +84,7 @@ def place(pieces: Iterable[Piece], placement: Placement) -> Iterator[Piece]:
             display_color=_filled(piece.display_color, placement.display_color),
             display_opacity=_filled(piece.display_opacity, placement.display_opacity),
             purpose=piece.purpose or placement.purpose,
-            bindings=tuple(bindings.under(placement.bindings) for bindings in piece.bindings),
+            bindings={path: bindings.under(placement.bindings) for path, bindings in piece.bindings.items()},
             in_world=piece.in_world or placement.in_world,
         )
 

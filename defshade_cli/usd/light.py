@@ -1,6 +1,6 @@
 """UsdLux lights in scene terms.
 
-What the scene cannot say yet (domes, lights made of geometry, portals, plug-in lights, IES profiles, textures,
+What the scene cannot say yet (lights made of geometry, portals, plug-in lights, IES profiles, textures,
 filters, linking, connected inputs) is reported; a light that has some of these is read without them.
 """
 
@@ -15,8 +15,18 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdLux
 
 from defshade_cli.scene.camera import Camera
-from defshade_cli.scene.light import CylinderLight, DiskLight, DistantLight, Light, RectLight, Shaping, SphereLight
+from defshade_cli.scene.light import (
+    CylinderLight,
+    DiskLight,
+    DistantLight,
+    DomeLight,
+    Light,
+    RectLight,
+    Shaping,
+    SphereLight,
+)
 from defshade_cli.scene.scene import Unsupported
+from defshade_cli.usd.dome import is_dome, pole, sky_texture
 
 CAMERA_LIGHT = "<camera light>"
 """Path of the light of a stage that has none."""
@@ -38,11 +48,15 @@ def is_light(prim: Usd.Prim) -> bool:
 
 
 def read_light(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Light | None, tuple[Unsupported, ...]]:
-    """The light at `time` in its own space (world_from_light is the identity), and what of it is left out.
+    """The light at `time` in its own space (world_from_light is the identity, or a dome's pole), and what is left out.
 
     None for a kind that is not supported. Purposes do not concern lights, as in Hydra.
     """
     path = str(prim.GetPath())
+    if is_dome(prim):
+        texture, problem = sky_texture(prim, time)
+        dome = DomeLight(path=path, world_from_light=pole(prim), texture=texture, **_common(prim, time))
+        return dome, tuple(Unsupported(path, reason) for reason in [problem, *_left_out(prim, time)] if reason)
     for schema, light_class, sizes in _CLASSES:
         if prim.IsA(schema):
             fields = {size: _input(prim, size, time) for size in sizes}
@@ -93,7 +107,7 @@ def _left_out(prim: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
             yield f"{link.GetName()} is ignored: everything is linked"
     if api.GetFiltersRel().GetForwardedTargets():
         yield "light filters are ignored"
-    for name in ("texture:file", "shaping:ies:file"):
+    for name in ("shaping:ies:file",) if is_dome(prim) else ("texture:file", "shaping:ies:file"):
         file = _input(prim, name, time)
         if file and file.path:
             yield f"inputs:{name} is ignored"

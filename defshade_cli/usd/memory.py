@@ -7,7 +7,7 @@ from dataclasses import replace
 from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.usd.binding import Bindings, read_bindings
-from defshade_cli.usd.geometry import Gprim, is_time_varying, read_gprim
+from defshade_cli.usd.geometry import Surface, is_time_varying, read_surface
 from defshade_cli.usd.kind import Kinds
 from defshade_cli.usd.material import ReadMaterial, read_material
 
@@ -22,22 +22,22 @@ class Memory:
         self.kinds = Kinds()
         self.xforms = UsdGeom.XformCache()
         self._stage = stage
-        self._gprims: dict[Sdf.Path, tuple[Usd.TimeCode, Gprim | None]] = {}
+        self._surfaces: dict[Sdf.Path, tuple[Usd.TimeCode, Surface | None]] = {}
         self._time_varying: dict[Sdf.Path, bool] = {}
         self._bindings: dict[Sdf.Path, Bindings] = {}
         self._materials: dict[Sdf.Path, ReadMaterial] = {}
         self._first_instances: dict[str, str] = {}
 
-    def gprim(self, prim: Usd.Prim, time: Usd.TimeCode) -> Gprim | None:
+    def surface(self, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
         """The same object at every time, unless something of the prim varies."""
         path = prim.GetPath()
-        if path in self._gprims:
-            time_read, gprim = self._gprims[path]
+        if path in self._surfaces:
+            time_read, surface = self._surfaces[path]
             if time == time_read or not self._is_time_varying(prim):
-                return gprim
-        gprim = self._as_shown(read_gprim(prim, time), path)
-        self._gprims[path] = time, gprim
-        return gprim
+                return surface
+        surface = self._as_shown(read_surface(prim, time), path)
+        self._surfaces[path] = time, surface
+        return surface
 
     def material(self, path: Sdf.Path, time: Usd.TimeCode) -> ReadMaterial:
         if path in self._materials:
@@ -70,9 +70,9 @@ class Memory:
             self._time_varying[path] = is_time_varying(prim)
         return self._time_varying[path]
 
-    def _as_shown(self, gprim: Gprim | None, path: Sdf.Path) -> Gprim | None:
+    def _as_shown(self, surface: Surface | None, path: Sdf.Path) -> Surface | None:
         shown = self.shown(path)
-        if gprim is None or shown == gprim.mesh.path:
-            return gprim
-        issues = tuple(replace(issue, path=self.shown(issue.path)) for issue in gprim.issues)
-        return replace(gprim, mesh=replace(gprim.mesh, path=shown), issues=issues)
+        if surface is None or shown == surface.path:
+            return surface
+        issues = tuple(replace(issue, path=shown) for issue in surface.issues)
+        return replace(surface, path=shown, issues=issues)

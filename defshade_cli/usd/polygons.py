@@ -72,6 +72,21 @@ class Polygons:
         return tuple(primvar for primvar in named if primvar is not None)
 
     @cached_property
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 3) least and greatest corner of the points that faces use; (+inf, −inf) without any."""
+        used = self.points[self.indices].astype(np.float64)
+        return np.stack([used.min(axis=0, initial=np.inf), used.max(axis=0, initial=-np.inf)])
+
+    @cached_property
+    def mean_edge(self) -> float:
+        """Root of the mean square of the edges' lengths, 0 without any; an edge counts once a face."""
+        following = np.arange(1, len(self.indices) + 1)
+        ends = np.cumsum(self.counts, dtype=np.intp)
+        following[ends - 1] = ends - self.counts
+        points = self.points[self.indices].astype(np.float64)
+        return float(np.sqrt(np.square(points[following] - points).sum() / max(len(points), 1)))
+
+    @cached_property
     def face_of_corner(self) -> NDArray[np.int32]:
         """(C,) the face that each corner is part of."""
         return np.repeat(np.arange(len(self.counts), dtype=np.int32), self.counts)

@@ -3,45 +3,58 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from pxr import Usd
 
 from defshade_cli.errors import EmptyStage
-from defshade_cli.scene.camera import Camera
-from defshade_cli.scene.geometry import Drawable, Mesh, Subset
+from defshade_cli.scene.camera import Camera, image_size
+from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import UNBOUND
 from defshade_cli.scene.scene import Scene, Unsupported
+from defshade_cli.settings import Complexity
 from defshade_cli.usd import stage as facts
 from defshade_cli.usd.camera import choose_camera, find_cameras, framed_camera, read_camera
-from defshade_cli.usd.geometry import Gprim
+from defshade_cli.usd.complexity import View, choose_levels
+from defshade_cli.usd.geometry import Gprim, Surface
 from defshade_cli.usd.instancing import Piece
 from defshade_cli.usd.light import camera_light
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.palette import Palette
 from defshade_cli.usd.settings import read_settings
+from defshade_cli.usd.tessellation import Tessellation
 from defshade_cli.usd.traversal import Traversal
 
 log = logging.getLogger("defshade")
 
-_NOWHERE = np.full((2, 3), np.nan)
+PlacedSurface = tuple[Piece, Surface]
 
 
 class StageReader:
     """Reads frames of one stage. What does not change over time is read once, and stays the same object.
 
     camera: path or name; without it the rule of usd/camera.py picks.  purposes: of the geometry that is drawn.
+    complexity: of subdivision surfaces; for `auto` it matters how large the image is, see scene.camera.image_size.
     Raises PrimNotFound for a camera that the stage lacks.
     """
 
     def __init__(
-        self, stage: Usd.Stage, *, camera: str | None = None, purposes: Sequence[str] = ("default", "render")
+        self,
+        stage: Usd.Stage,
+        *,
+        camera: str | None = None,
+        purposes: Sequence[str] = ("default", "render"),
+        complexity: Complexity = "auto",
+        size: tuple[int, int] | None = None,
+        width: int | None = None,
     ) -> None:
         self._stage, self._purposes = stage, tuple(purposes)
+        self._complexity, self._size, self._width = complexity, size, width
         self._memory = Memory(stage)
+        self._tessellation = Tessellation()
         self._settings = read_settings(stage)
         self._cameras = find_cameras(stage)
         self._camera = choose_camera(stage, self._cameras, camera, self._settings.camera)
@@ -69,54 +82,76 @@ class StageReader:
     def _read(self, frame: float | None, time: Usd.TimeCode) -> Scene:
         traversal = Traversal(self._stage, self._memory, time, self._purposes)
         pieces = traversal.read_stage()
+        drawn = tuple(_drawn(pieces, self._purposes))
+        if not drawn and not traversal.dormant:
+            raise EmptyStage(_empty(self._stage, traversal.issues))
+        camera, camera_issues = self._read_camera(time, drawn)
+        gprims = self._tessellate(drawn, camera)
         palette = Palette(self._memory, time)
         meshes: dict[Mesh, int] = {}
-        drawables = tuple(self._drawables(pieces, meshes, palette))
-        if not drawables and not traversal.dormant:
-            raise EmptyStage(_empty(self._stage, traversal.issues))
-        camera, camera_issues = self._read_camera(time)
-        up_axis = facts.up_axis(self._stage)
-        scene = Scene(
+        drawables = tuple(_drawables(drawn, gprims, meshes, palette))
+        mended = dict.fromkeys(issue for gprim in gprims.values() for issue in gprim.issues)
+        return Scene(
             name=facts.stage_name(self._stage),
             meshes=tuple(meshes),
             drawables=drawables,
             materials=palette.materials,
             lights=tuple(_lights(pieces)),
-            camera=camera or framed_camera(_NOWHERE, up_axis),
+            camera=camera,
             cameras=self._cameras,
-            unsupported=(*traversal.issues, *palette.issues, *camera_issues, *self._settings.issues),
+            unsupported=(*traversal.issues, *mended, *palette.issues, *camera_issues, *self._settings.issues),
             meters_per_unit=facts.meters_per_unit(self._stage),
-            up_axis=up_axis,
+            up_axis=facts.up_axis(self._stage),
             frame=frame,
             frames_per_second=facts.frames_per_second(self._stage),
             resolution=self._settings.resolution,
+            pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
         )
-        if camera is None:
-            scene = replace(scene, camera=framed_camera(scene.bounds, up_axis))
-        return replace(scene, pixel_aspect=self._settings.pixel_aspect_for(scene.camera))
 
-    def _drawables(self, pieces: Iterable[Piece], meshes: dict[Mesh, int], palette: Palette) -> Iterator[Drawable]:
-        """What is drawn of the pieces; `meshes` takes their meshes, each with its number."""
-        for piece in pieces:
-            if isinstance(piece.content, Gprim) and (piece.purpose or "default") in self._purposes:
-                numbers = [palette.number(bindings) for bindings in piece.bindings]
-                groups = zip(numbers, piece.content.groups, strict=True)
-                yield Drawable(
-                    mesh=meshes.setdefault(piece.content.mesh, len(meshes)),
-                    world_from_object=piece.root_from_object,
-                    subsets=tuple(Subset(number, group.first, group.count) for number, group in groups),
-                    paths=piece.paths,
-                    instance_ids=piece.ids,
-                    display_color=np.nan_to_num(piece.display_color, nan=UNBOUND.diffuse_color[0]),
-                    display_opacity=np.nan_to_num(piece.display_opacity, nan=UNBOUND.opacity),
-                )
-
-    def _read_camera(self, time: Usd.TimeCode) -> tuple[Camera | None, tuple[Unsupported, ...]]:
+    def _read_camera(
+        self, time: Usd.TimeCode, drawn: Iterable[PlacedSurface]
+    ) -> tuple[Camera, tuple[Unsupported, ...]]:
+        """The camera; one of ours frames the surfaces as authored, however they are refined."""
         if self._camera is None:
-            return None, ()
+            boxes = (world_boxes(surface.polygons.bounds, piece.root_from_object) for piece, surface in drawn)
+            return framed_camera(enclose(boxes), facts.up_axis(self._stage)), ()
         camera, issues = read_camera(self._camera, time)
         return self._settings.applied_to(camera), issues
+
+    def _tessellate(self, drawn: Iterable[PlacedSurface], camera: Camera) -> dict[Surface, Gprim]:
+        width, height = image_size(camera.aspect, self._size, self._width, self._settings.resolution)
+        aspect = width * self._settings.pixel_aspect_for(camera) / height
+        view = View(camera.conformed(aspect, self._settings.conform), height)
+        placed = ((surface, piece.root_from_object) for piece, surface in drawn)
+        levels = choose_levels(placed, self._complexity, view)
+        return {surface: self._tessellation.at_level(surface, level) for surface, level in levels.items()}
+
+
+def _drawn(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[PlacedSurface]:
+    for piece in pieces:
+        if isinstance(piece.content, Surface) and (piece.purpose or "default") in purposes:
+            yield piece, piece.content
+
+
+def _drawables(
+    drawn: Iterable[PlacedSurface], gprims: Mapping[Surface, Gprim], meshes: dict[Mesh, int], palette: Palette
+) -> Iterator[Drawable]:
+    """What is drawn; `meshes` takes the meshes, each with its number."""
+    for piece, surface in drawn:
+        gprim = gprims[surface]
+        if not gprim.groups:
+            continue
+        subsets = (Subset(palette.number(piece.bindings[g.path]), g.first, g.count) for g in gprim.groups)
+        yield Drawable(
+            mesh=meshes.setdefault(gprim.mesh, len(meshes)),
+            world_from_object=piece.root_from_object,
+            subsets=tuple(subsets),
+            paths=piece.paths,
+            instance_ids=piece.ids,
+            display_color=np.nan_to_num(piece.display_color, nan=UNBOUND.diffuse_color[0]),
+            display_opacity=np.nan_to_num(piece.display_opacity, nan=UNBOUND.opacity),
+        )
 
 
 def _lights(pieces: Iterable[Piece]) -> Iterator[Light]:
@@ -124,7 +159,8 @@ def _lights(pieces: Iterable[Piece]) -> Iterator[Light]:
         if isinstance(piece.content, Light):
             count = len(piece.root_from_object)
             paths = piece.paths if len(piece.paths) == count else piece.paths * count
-            for path, world_from_light in zip(paths, piece.root_from_object, strict=True):
+            for path, world_from_object in zip(paths, piece.root_from_object, strict=True):
+                world_from_light = world_from_object @ piece.content.world_from_light
                 yield replace(piece.content, path=path, world_from_light=world_from_light)
 
 

@@ -25,28 +25,49 @@ class FaceGroup:
     count: int
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Faces:
+    """The authored faces of a prim by their materials.
+
+    paths: prim path of the gprim, then of its subsets.
+    group: (authored faces,) index into `paths` of each; None where all are in the first.
+    """
+
+    paths: tuple[str, ...]
+    group: NDArray[np.intp] | None = None
+
+    def groups_of(self, faces: NDArray[np.int32]) -> tuple[str, ...]:
+        """The paths of the groups that these faces are in, in order."""
+        if self.group is None:
+            return self.paths if len(faces) else ()
+        return tuple(self.paths[number] for number in np.unique(self.group[faces]))
+
+    def sort(self, mesh: Mesh) -> tuple[Mesh, tuple[FaceGroup, ...]]:
+        """The mesh with its triangles sorted into groups, which cover them all."""
+        if self.group is None:
+            whole = FaceGroup(self.paths[0], 0, len(mesh.triangles))
+            return mesh, (whole,) if whole.count else ()
+        group = self.group[mesh.faces]
+        order = np.argsort(group, kind="stable")
+        counts = np.bincount(group, minlength=len(self.paths))
+        firsts = np.cumsum(counts) - counts
+        groups = (FaceGroup(p, int(f), int(c)) for p, f, c in zip(self.paths, firsts, counts, strict=True) if c)
+        return replace(mesh, triangles=mesh.triangles[order], faces=mesh.faces[order]), tuple(groups)
+
+
 def material_subsets(prim: Usd.Prim) -> list[UsdGeom.Subset]:
     """The subsets of the prim's faces in the family materialBind."""
     subsets = UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets()
     return [s for s in subsets if s.GetElementTypeAttr().Get() == UsdGeom.Tokens.face]
 
 
-def group_faces(
-    mesh: Mesh, prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]
-) -> tuple[Mesh, tuple[FaceGroup, ...]]:
-    """The mesh with its triangles sorted into groups, the gprim's own first; the groups cover them all."""
-    subsets = material_subsets(prim)
+def read_faces(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> Faces:
+    """Which subset holds each face, the gprim itself those that none does."""
+    subsets, path = material_subsets(prim), str(prim.GetPath())
     if not subsets:
-        whole = FaceGroup(mesh.path, 0, len(mesh.triangles))
-        return mesh, (whole,) if whole.count else ()
-    group_of_face = _group_of_face(subsets, UsdGeom.Mesh(prim).GetFaceCount(time), time, issues)
-    group = group_of_face[mesh.faces]
-    order = np.argsort(group, kind="stable")
-    counts = np.bincount(group, minlength=len(subsets) + 1)
-    paths = [mesh.path, *(str(subset.GetPath()) for subset in subsets)]
-    firsts = np.cumsum(counts) - counts
-    groups = (FaceGroup(p, int(f), int(c)) for p, f, c in zip(paths, firsts, counts, strict=True) if c)
-    return replace(mesh, triangles=mesh.triangles[order], faces=mesh.faces[order]), tuple(groups)
+        return Faces((path,))
+    group = _group_of_face(subsets, UsdGeom.Mesh(prim).GetFaceCount(time), time, issues)
+    return Faces((path, *(str(subset.GetPath()) for subset in subsets)), group)
 
 
 def _group_of_face(

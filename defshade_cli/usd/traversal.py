@@ -6,7 +6,7 @@ reset xform stacks and instances are resolved on the way down; bindings and prim
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from pxr import Sdf, Usd, UsdGeom
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.binding import Bindings
-from defshade_cli.usd.geometry import Gprim, is_time_varying
+from defshade_cli.usd.geometry import Surface, is_time_varying
 from defshade_cli.usd.instancing import Piece, Standing, place
 from defshade_cli.usd.kind import Kind
 from defshade_cli.usd.light import is_light, read_light
@@ -98,21 +98,21 @@ class Traversal:
             self._report(prim, f"no schema defines the type {prim.GetTypeName()}")
 
     def _gprim(self, prim: Usd.Prim, here: Standing) -> Iterator[Piece]:
-        gprim = self._memory.gprim(prim, self._time)
-        if gprim is None:
+        surface = self._memory.surface(prim, self._time)
+        if surface is None:
             self._report(prim, f"prims of type {prim.GetTypeName()} are not drawn")
             return
-        self.issues.update(dict.fromkeys(gprim.issues))
-        if not gprim.groups:
+        self.issues.update(dict.fromkeys(surface.issues))
+        if not surface.groups:
             self.dormant |= is_time_varying(prim)
             return
-        yield self._piece(prim, here, gprim, tuple(self._memory.bindings(group.path) for group in gprim.groups))
+        yield self._piece(prim, here, surface, {path: self._memory.bindings(path) for path in surface.groups})
 
     def _piece(
-        self, prim: Usd.Prim, here: Standing, content: Gprim | Light, bindings: tuple[Bindings, ...] = ()
+        self, prim: Usd.Prim, here: Standing, content: Surface | Light, bindings: Mapping[str, Bindings] | None = None
     ) -> Piece:
-        color = content.display_color if isinstance(content, Gprim) else None
-        opacity = content.display_opacity if isinstance(content, Gprim) else None
+        color = content.display_color if isinstance(content, Surface) else None
+        opacity = content.display_opacity if isinstance(content, Surface) else None
         return Piece(
             content,
             matrix(here.root_from_prim)[None],
@@ -121,7 +121,7 @@ class Traversal:
             np.full((1, 3), np.nan if color is None else color, np.float32),
             np.full(1, np.nan if opacity is None else opacity, np.float32),
             here.purpose,
-            bindings,
+            bindings or {},
             here.in_world,
         )
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal, get_args
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,18 +36,18 @@ class Topology:
     Raises ValueError with the reason where the arrays do not describe a mesh that the scheme takes.
     """
 
-    face_counts: NDArray[np.int32]
-    face_indices: NDArray[np.int32]
+    face_counts: NDArray[Any]
+    face_indices: NDArray[Any]
     vertex_count: int
     scheme: SchemeName = "catmullClark"
     interpolate_boundary: BoundaryRule = "edgeAndCorner"
     triangle_subdivision_rule: TriangleRule = "catmullClark"
-    holes: NDArray[np.int32] = field(default_factory=_no_indices)
-    crease_indices: NDArray[np.int32] = field(default_factory=_no_indices)
-    crease_lengths: NDArray[np.int32] = field(default_factory=_no_indices)
-    crease_sharpnesses: NDArray[np.float64] = field(default_factory=_no_sharpnesses)
-    corner_indices: NDArray[np.int32] = field(default_factory=_no_indices)
-    corner_sharpnesses: NDArray[np.float64] = field(default_factory=_no_sharpnesses)
+    holes: NDArray[Any] = field(default_factory=_no_indices)
+    crease_indices: NDArray[Any] = field(default_factory=_no_indices)
+    crease_lengths: NDArray[Any] = field(default_factory=_no_indices)
+    crease_sharpnesses: NDArray[Any] = field(default_factory=_no_sharpnesses)
+    corner_indices: NDArray[Any] = field(default_factory=_no_indices)
+    corner_sharpnesses: NDArray[Any] = field(default_factory=_no_sharpnesses)
 
     def __post_init__(self) -> None:
         for name in ("face_counts", "face_indices", "holes", "crease_indices", "crease_lengths", "corner_indices"):
@@ -100,6 +100,10 @@ class Topology:
         _require_range("corner index", self.corner_indices, self.vertex_count, "points")
         if np.isnan(self.corner_sharpnesses).any():
             raise ValueError("a corner sharpness is not a number")
+
+    def equals(self, other: Topology) -> bool:
+        """Do both describe the same mesh, so that stencils of one serve the other?"""
+        return all(np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
 
     def crease_edges(self) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
         """(N, 2) vertex pairs of all creases and (N,) their sharpness."""

@@ -1,0 +1,184 @@
+"""`defshade batch`."""
+
+from __future__ import annotations
+
+import functools
+import shlex
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from defshade_cli.cli.jobfile import JOB_SUFFIXES, read_job_file
+from defshade_cli.cli.options import (
+    Function,
+    HeadedCommand,
+    Option,
+    Reporting,
+    epilog,
+    make_job,
+    render_options,
+    take,
+    with_output,
+)
+from defshade_cli.cli.progress import frame_name, make_progress, start_logging
+from defshade_cli.cli.table import BatchTable
+from defshade_cli.cli.tally import Tally
+from defshade_cli.errors import BatchError
+from defshade_cli.settings import RenderJob
+
+if TYPE_CHECKING:
+    from defshade_cli.farm.tasks import Chunk
+
+TERMINATED = 143  # 128 + SIGTERM, as shells have it
+
+_EPILOG = epilog(
+    "defshade batch shots/*.usda --frames 1:240 -o 'renders/{scene}/{scene}.####.exr'",
+    "defshade batch nightly.yaml --existing skip --retries 2 --stats nightly.json",
+    "defshade batch nightly.yaml --samples 1 --dry-run",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """How a batch is spread. workers, chunk: None is for the scheduler to say."""
+
+    workers: int | None
+    chunk: int | None
+    retries: int
+    keep_going: bool
+    dry_run: bool
+
+
+def _takes_jobs(function: Function) -> Function:
+    """Call `function` with the RenderJobs of the arguments, a Reporting and a Schedule."""
+
+    @functools.wraps(function)
+    def command(sources: tuple[Path, ...], **values: Any) -> Any:
+        reporting, schedule = Reporting(**take(values, Reporting)), Schedule(**take(values, Schedule))
+        context = click.get_current_context()
+        shots = [shot for source in sources for shot in _shots(source, context)]
+        jobs = [with_output(make_job(values | shot), "{scene}") for shot in shots]
+        return function(jobs, reporting, schedule)
+
+    argument = click.argument(
+        "sources", nargs=-1, required=True, metavar="SCENE|JOB.yaml...", type=click.Path(path_type=Path)
+    )
+    for option in reversed([argument, *render_options(), *_batch_options()]):
+        command = option(command)
+    return command
+
+
+def _shots(source: Path, context: click.Context) -> list[dict[str, Any]]:
+    """Option values, one set for each stage and camera that an argument stands for."""
+    return read_job_file(source, context) if source.suffix in JOB_SUFFIXES else [{"scene": source}]
+
+
+def _batch_options() -> list[Function]:
+    option = functools.partial(click.option, cls=Option, heading="Batch")
+    return [
+        option(
+            "--workers",
+            type=click.IntRange(min=1),
+            metavar="N",
+            default_text="one a core, as memory allows",
+            help="Worker processes.",
+        ),
+        option(
+            "--chunk",
+            type=click.IntRange(min=1),
+            metavar="N",
+            default_text="a quarter of a worker's share, at most 16",
+            help="Frames of a stage that a worker takes at a time.",
+        ),
+        option(
+            "--retries",
+            type=click.IntRange(min=0),
+            metavar="N",
+            default=1,
+            default_text="1",
+            help="How often a frame that failed is rendered again.",
+        ),
+        option(
+            "--keep-going/--fail-fast",
+            default=True,
+            default_text="--keep-going",
+            help="Whether the other frames are rendered after one has failed for good.",
+        ),
+        option("--dry-run", is_flag=True, help="Print the tasks and render nothing."),
+    ]
+
+
+@click.command(cls=HeadedCommand, epilog=_EPILOG)
+@_takes_jobs
+def batch(jobs: Sequence[RenderJob], reporting: Reporting, schedule: Schedule) -> None:
+    """Render many stages over many frames, in worker processes.
+
+    The arguments are USD stages and job files; options that are given count for both. A worker that crashes costs the
+    frame at work. The paths of the files go to stdout, one a line; a summary ends the batch, and exit code 6 says that
+    some frame failed.
+    """
+    from defshade_cli.farm.local import default_workers
+    from defshade_cli.farm.tasks import check_batch, chunk_size, frame_count, make_chunks
+
+    start_logging(reporting)
+    check_batch(jobs)
+    frames = frame_count(jobs)
+    workers = schedule.workers or default_workers(frames)
+    chunks = make_chunks(jobs, schedule.chunk or chunk_size(frames, workers))
+    if schedule.dry_run:
+        for chunk in chunks:
+            click.echo(_task_line(chunk))
+    else:
+        with _ended_by_sigterm():
+            _render(jobs, chunks, workers, reporting, schedule)
+
+
+def _render(
+    jobs: Sequence[RenderJob], chunks: Sequence[Chunk], workers: int, reporting: Reporting, schedule: Schedule
+) -> None:
+    from defshade_cli.farm.batch import run_batch
+    from defshade_cli.farm.local import LocalEngine
+    from defshade_cli.farm.tasks import frame_count, leaving_no_leftovers
+
+    level = "INFO" if reporting.verbose else "WARNING"
+    command = shlex.join(["defshade", *sys.argv[1:]])
+    with make_progress(reporting, frame_count(jobs), BatchTable) as progress, Tally(jobs, reporting) as tally:
+        with leaving_no_leftovers(jobs), LocalEngine(workers, command=command, log_level=level) as engine:
+            for outcome in run_batch(chunks, engine, retries=schedule.retries, keep_going=schedule.keep_going):
+                tally.add(outcome)
+                if outcome.error:
+                    progress.frame_failed(outcome)
+                    continue
+                progress.frame(outcome)
+                for path in outcome.paths:
+                    click.echo(path)
+        if tally.failures:
+            raise BatchError(tally.verdict)
+
+
+def _task_line(chunk: Chunk) -> str:
+    job = chunk.job
+    frames = ",".join(frame_name(frame) for frame in job.frames) or "first frame"
+    camera = f"  camera {job.camera}" if job.camera else ""
+    return f"{job.stage}{camera}  frames {frames}  → {', '.join(job.output.patterns)}"
+
+
+@contextmanager
+def _ended_by_sigterm() -> Iterator[None]:
+    """Leave the block in order when the process is asked to end."""
+
+    def leave(_signal: int, _frame: FrameType | None) -> None:
+        sys.exit(TERMINATED)
+
+    before = signal.signal(signal.SIGTERM, leave)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

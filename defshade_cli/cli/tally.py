@@ -1,0 +1,105 @@
+"""What a batch came to: counts, failures with their logs, and the record that --stats writes of it."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import click
+
+from defshade_cli import __version__
+from defshade_cli.cli.options import Reporting
+from defshade_cli.cli.progress import failure, frame_name
+from defshade_cli.cli.stats import plain
+from defshade_cli.errors import OutputError
+from defshade_cli.settings import RenderJob
+
+if TYPE_CHECKING:
+    from defshade_cli.farm.tasks import Outcome
+
+_NAMED = 5
+
+
+class Tally:
+    """Gathers outcomes; a context manager that prints the summary and writes the record, also after an interruption.
+
+    The record is written before the batch as well, so that a file that cannot be written costs no render: OutputError.
+    """
+
+    def __init__(self, jobs: Sequence[RenderJob], reporting: Reporting) -> None:
+        self.failures: list[Outcome] = []
+        self._counts = {"rendered": 0, "skipped": 0, "failed": 0}
+        self._reporting, self._start = reporting, time.perf_counter()
+        self._record: dict[str, Any] = {"version": __version__, "jobs": jobs, "frames": []}
+        self._said: set[str] = set()
+
+    def __enter__(self) -> Self:
+        self._write()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if not self._reporting.quiet:
+            click.echo(self.summary, err=True)
+        self._record["seconds"] = time.perf_counter() - self._start
+        self._write()
+
+    def add(self, outcome: Outcome) -> None:
+        """Count the outcome, and show what its log says that no log before it said."""
+        what = "failed" if outcome.error else "skipped" if outcome.skipped else "rendered"
+        self._counts[what] += 1
+        if outcome.error:
+            self.failures.append(outcome)
+        if self._reporting.stats is not None:
+            self._record["frames"].append(_figures(outcome, what))
+        if not self._reporting.quiet:
+            self._show(outcome.log)
+
+    @property
+    def summary(self) -> str:
+        """Counts, time and rate, then a line for each failure."""
+        seconds = time.perf_counter() - self._start
+        done = sum(self._counts.values())
+        counts = ", ".join(f"{count} {what}" for what, count in self._counts.items())
+        head = f"{done} frames in {seconds:.1f} s ({done / seconds:.1f} a second): {counts}"
+        return "\n".join([head, *(f"  {failure(outcome)}" for outcome in self.failures)])
+
+    @property
+    def verdict(self) -> str:
+        """One sentence that names the frames that failed, the first few of them."""
+        named = [f"{outcome.stage} {frame_name(outcome.frame)}" for outcome in self.failures[:_NAMED]]
+        more = f" and {len(self.failures) - _NAMED} more" if len(self.failures) > _NAMED else ""
+        return f"{len(self.failures)} of {sum(self._counts.values())} frames failed: {', '.join(named)}{more}"
+
+    def _show(self, log: str) -> None:
+        for line in log.splitlines():
+            if line not in self._said:
+                self._said.add(line)
+                click.echo(line, err=True)
+
+    def _write(self) -> None:
+        path = self._reporting.stats
+        if path is None:
+            return
+        try:
+            path.write_text(json.dumps(plain(self._record), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        except OSError as error:
+            raise OutputError(f"cannot write {path}: {error.strerror}") from error
+
+
+def _figures(outcome: Outcome, what: str) -> dict[str, Any]:
+    return {
+        "stage": outcome.stage,
+        "camera": outcome.task.job.camera,
+        "frame": outcome.frame,
+        "outcome": what,
+        "attempts": outcome.task.attempt,
+        "paths": outcome.paths,
+        "seconds": outcome.seconds,
+        "error": outcome.error,
+        "log": outcome.log,
+    }

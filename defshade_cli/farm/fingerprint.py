@@ -1,0 +1,62 @@
+"""What a frame was made of, as a short text that its file's header keeps: equal texts, equal pictures.
+
+It covers the contents of every layer, texture and other asset that the stage depends on, their names as seen from the
+stage, the camera and all settings that reach the file, the frame and the version of defshade. It leaves out where the
+stage and the output lie and the device, so a copied folder or another host finds its frames finished. Contents and not
+dates are compared, for copying and version control change dates; a file is read once a process as long as its size and
+date stay.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from dataclasses import replace
+from functools import cache, cached_property
+from pathlib import Path
+
+from defshade_cli import __version__
+from defshade_cli.errors import StageError
+from defshade_cli.settings import RenderJob
+from defshade_cli.usd.dependencies import read_dependencies
+
+log = logging.getLogger("defshade")
+
+_BYTES = 16
+
+
+class Fingerprint:
+    """The fingerprints of a job's frames. The stage is read once, when the first is asked for."""
+
+    def __init__(self, job: RenderJob) -> None:
+        self._job = job
+
+    def of(self, frame: float | None) -> str:
+        """32 hexadecimal digits; nothing where it cannot be known what the stage depends on."""
+        if self._base is None:
+            return ""
+        return hashlib.blake2b(f"{self._base} {frame!r}".encode(), digest_size=_BYTES).hexdigest()
+
+    @cached_property
+    def _base(self) -> str | None:
+        """What all frames have in common."""
+        try:
+            needed = read_dependencies(self._job.stage)
+            contents = sorted((name, _contents(path)) for name, path in needed.files.items())
+        except (StageError, OSError) as error:
+            log.info("its frames will never count as finished: %s", error)
+            return None
+        output = replace(self._job.output, patterns=(), existing="overwrite")
+        job = replace(self._job, stage=Path(self._job.stage.name), frames=(), device=None, output=output)
+        return repr((__version__, contents, needed.missing, job))
+
+
+def _contents(path: Path) -> str:
+    status = path.stat()
+    return _digest(path, status.st_size, status.st_mtime_ns)
+
+
+@cache
+def _digest(path: Path, _size: int, _changed: int) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=_BYTES)).hexdigest()

@@ -1,0 +1,98 @@
+"""The environment pass: what domes show behind the geometry, and in a frame of one sample their light on it.
+
+With more samples, directions drawn from the sky light the geometry like distant lights, with shadows
+(passes/emitters.py); this pass then draws the background alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.targets import Target
+from defshade_cli.image.environment import sky_of
+from defshade_cli.passes.gbuffer import GBuffer
+from defshade_cli.passes.planes import Plane, read_source
+from defshade_cli.plan import Plan
+from defshade_cli.scene.environment import Environment
+from defshade_cli.scene.light import DomeLight
+from defshade_cli.settings import Layout
+from defshade_cli.spaces import rigid
+
+_HALF_MAX = 65504.0
+
+
+@dataclass(frozen=True, slots=True)
+class EnvironmentVariant:
+    """What the pass is compiled for. analytic: light the geometry too; background: show the sky."""
+
+    planes: tuple[Plane, ...]
+    layout: Layout
+    orthographic: bool
+    analytic: bool
+    background: bool
+
+    @classmethod
+    def of(cls, plan: Plan) -> EnvironmentVariant:
+        orthographic = plan.camera.projection == "orthographic"
+        return cls(plan.planes, plan.layout, orthographic, plan.samples == 1, plan.background)
+
+    @property
+    def defines(self) -> list[str]:
+        flags = ["ORTHOGRAPHIC"] * self.orthographic + ["ANALYTIC"] * self.analytic + ["BACKGROUND"] * self.background
+        return [plane.define for plane in self.planes] + flags
+
+
+class EnvironmentPass:
+    """Compiled for one variant; keeps the skies it has drawn as textures."""
+
+    def __init__(self, gpu: Gpu, variant: EnvironmentVariant) -> None:
+        self._gpu = gpu
+        generated = {"generated/planes.glsl": read_source(variant.planes, variant.layout)}
+        files = ("screen.vert", "environment.frag")
+        self._program = gpu.shaders.program(*files, defines=variant.defines, generated=generated)
+        self._screen = gpu.keep(gpu.context.vertex_array(self._program, []))
+        self._skies: dict[Environment, moderngl.Texture] = {}
+
+    def draw(self, dome: DomeLight, gbuffer: GBuffer, radiance: Target) -> None:
+        """Add the dome to `radiance`."""
+        radiance.framebuffer.use()
+        self._gpu.context.enable_only(moderngl.BLEND)
+        self._gpu.context.blend_func = moderngl.ONE, moderngl.ONE
+        sky = sky_of(dome)
+        textures = {"sky": self._texture(sky), "plane_depth": gbuffer.target.depth}
+        textures |= {f"plane_{name}": texture for name, texture in gbuffer.target.textures.items()}
+        for unit, (name, texture) in enumerate(textures.items()):
+            if texture and name in self._program:
+                texture.use(unit)
+                self._program[name] = unit
+        for name, value in _uniforms(dome, sky).items():
+            if name in self._program:
+                self._program[name] = value
+        self._screen.render(vertices=3)
+
+    def _texture(self, sky: Environment) -> moderngl.Texture:
+        if sky not in self._skies:
+            height, width = sky.radiance.shape[:2]
+            pixels = np.minimum(sky.radiance, _HALF_MAX).astype(np.float16)
+            texture = self._gpu.keep(
+                self._gpu.context.texture((width, height), 3, pixels.tobytes(), dtype="f2", alignment=1)
+            )
+            texture.repeat_y = False
+            texture.build_mipmaps()
+            texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+            self._skies[sky] = self._gpu.keep(texture)
+        return self._skies[sky]
+
+
+def _uniforms(dome: DomeLight, sky: Environment) -> dict[str, object]:
+    rotation = rigid(dome.world_from_light)[:3, :3]
+    return {
+        "sky_from_relative": tuple(rotation.ravel()),  # the transpose of a rotation, column by column
+        "sky_emission": tuple(dome.emission),
+        "irradiance_sh": [tuple(row) for row in sky.irradiance_sh],
+        "response": (dome.diffuse, dome.specular),
+    }

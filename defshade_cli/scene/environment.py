@@ -1,0 +1,140 @@
+"""The sky of a dome light: radiance by direction, how to sample it, and the irradiance that it gives.
+
+Directions are in the dome's own space, as OpenEXR lays out latitude-longitude maps: the image's centre is +Z, a quarter
+from the left is +X, the top is +Y.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.scene.arrays import frozen
+
+_CELLS = (128, 256)
+"""Rows and columns that directions are drawn from; a finer map is averaged into them."""
+
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+_COSINE_LOBE = np.array([math.pi, *[2 * math.pi / 3] * 3, *[math.pi / 4] * 5])
+
+
+@dataclass(frozen=True, eq=False)
+class Environment:
+    """radiance: (H, W, 3) float32, scene-linear, row 0 at the top."""
+
+    radiance: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radiance", frozen(self.radiance, np.float32, *self.radiance.shape[:2], 3))
+
+    def sample(self, u: tuple[float, float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """A direction (3,) drawn in proportion to luminance, and the radiance from there over its density, (3,).
+
+        The mean of the second over samples is the integral of the radiance over all directions; black skies give 0.
+        """
+        rows, columns = self._rows, self._columns
+        row, v = _draw(rows, u[0])
+        column, t = _draw(columns[row], u[1])
+        sine_top, sine_bottom = self._sines[row], self._sines[row + 1]
+        sine = sine_top + (sine_bottom - sine_top) * v
+        left, right = self._longitudes[column], self._longitudes[column + 1]
+        longitude = left + (right - left) * t
+        cosine = math.sqrt(max(1.0 - sine * sine, 0.0))
+        direction = np.array([math.sin(longitude) * cosine, sine, math.cos(longitude) * cosine])
+        chance = _step(rows, row) * _step(columns[row], column)
+        return direction, self._cells[row, column] * (self._solid_angles[row, column] / chance if chance > 0 else 0.0)
+
+    @cached_property
+    def irradiance_sh(self) -> NDArray[np.float64]:
+        """(9, 3) coefficients in real spherical harmonics of the irradiance on a surface by its normal.
+
+        Ramamoorthi & Hanrahan 2001, "An Efficient Representation for Irradiance Environment Maps": within 1 % on
+        average for natural skies.
+        """
+        sine = 0.5 * (self._sines[1:] + self._sines[:-1])[:, None]
+        longitude = 0.5 * (self._longitudes[1:] + self._longitudes[:-1])[None, :]
+        cosine = np.sqrt(1.0 - sine * sine)
+        x, y, z = np.broadcast_arrays(np.sin(longitude) * cosine, sine, np.cos(longitude) * cosine)
+        basis = harmonics(np.stack([x, y, z], axis=-1))
+        return _COSINE_LOBE[:, None] * np.einsum("hwk,hw,hwc->kc", basis, self._solid_angles, self._cells)
+
+    @cached_property
+    def _edges(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Pixel rows and columns at which cells begin, and the end."""
+        shape = self.radiance.shape[:2]
+        edges = [np.linspace(0, n, min(n, most) + 1).astype(int) for n, most in zip(shape, _CELLS, strict=True)]
+        return edges[0], edges[1]
+
+    @cached_property
+    def _cells(self) -> NDArray[np.float64]:
+        """(h, w, 3) the map averaged over whole cells; its rows count by their solid angle."""
+        rows, columns = self._edges
+        height = self.radiance.shape[0]
+        weight = np.sin(math.pi * (np.arange(height) + 0.5) / height)[:, None, None]
+        summed = np.add.reduceat(self.radiance * weight, rows[:-1], axis=0) / np.add.reduceat(weight, rows[:-1], axis=0)
+        return np.add.reduceat(summed, columns[:-1], axis=1) / np.diff(columns)[:, None]
+
+    @cached_property
+    def _sines(self) -> NDArray[np.float64]:
+        """(h + 1,) sine of the latitude at the rows' edges, from the top."""
+        return np.cos(math.pi * self._edges[0] / self.radiance.shape[0])
+
+    @cached_property
+    def _longitudes(self) -> NDArray[np.float64]:
+        """(w + 1,) at the columns' edges, from the left: +π to −π."""
+        return 2.0 * math.pi * (0.5 - self._edges[1] / self.radiance.shape[1])
+
+    @cached_property
+    def _solid_angles(self) -> NDArray[np.float64]:
+        """(h, w) of each cell."""
+        return np.outer(np.diff(self._sines), np.diff(self._longitudes))
+
+    @cached_property
+    def _weights(self) -> NDArray[np.float64]:
+        return np.maximum(self._cells @ _LUMINANCE, 0.0) * self._solid_angles
+
+    @cached_property
+    def _rows(self) -> NDArray[np.float64]:
+        return _cumulative(self._weights.sum(axis=1))
+
+    @cached_property
+    def _columns(self) -> NDArray[np.float64]:
+        return _cumulative(self._weights)
+
+
+def uniform_environment() -> Environment:
+    """Radiance 1 from everywhere."""
+    return Environment(np.ones((8, 16, 3), np.float32))
+
+
+def harmonics(directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The nine real spherical harmonics up to degree 2 at unit vectors (..., 3); (..., 9)."""
+    x, y, z = np.moveaxis(directions, -1, 0)
+    c0, c1 = 0.5 / math.sqrt(math.pi), math.sqrt(3.0 / (4.0 * math.pi))
+    c2, c20, c22 = (math.sqrt(k / (16.0 * math.pi)) for k in (60.0, 5.0, 15.0))
+    bands = [c0 * np.ones_like(x), c1 * y, c1 * z, c1 * x]
+    bands += [c2 * x * y, c2 * y * z, c20 * (3 * z * z - 1), c2 * x * z, c22 * (x * x - y * y)]
+    return np.stack(bands, axis=-1)
+
+
+def _cumulative(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distribution function along the last axis; even where all weights are 0."""
+    total = weights.sum(axis=-1, keepdims=True)
+    even = np.where(total > 0, weights, 1.0)
+    return np.cumsum(even, axis=-1) / even.sum(axis=-1, keepdims=True)
+
+
+def _draw(distribution: NDArray[np.float64], u: float) -> tuple[int, float]:
+    """The step that `u` falls on, and how far into it, in [0, 1]."""
+    index = min(int(np.searchsorted(distribution, u, side="right")), len(distribution) - 1)
+    before = float(distribution[index - 1]) if index else 0.0
+    step = float(distribution[index]) - before
+    return index, min((u - before) / step, 1.0) if step > 0 else 0.5
+
+
+def _step(distribution: NDArray[np.float64], index: int) -> float:
+    return float(distribution[index] - (distribution[index - 1] if index else 0.0))

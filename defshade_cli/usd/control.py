@@ -1,0 +1,97 @@
+"""The control mesh of a subdivision surface, as far as a UsdGeom.Mesh says more of it than polygons."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+from defshade_cli.usd.polygons import Polygons
+from defshade_cli.usd.subdivision import LinearInterpolation, Topology
+from defshade_cli.usd.subdivision.topology import BoundaryRule, SchemeName, TriangleRule
+from defshade_cli.usd.values import floats, integers
+
+CONTROL_ATTRIBUTES = (
+    "creaseIndices",
+    "creaseLengths",
+    "creaseSharpnesses",
+    "cornerIndices",
+    "cornerSharpnesses",
+    "interpolateBoundary",
+    "triangleSubdivisionRule",
+    "faceVaryingLinearInterpolation",
+)
+"""What is read of a Mesh that may vary over time, besides what its polygons need."""
+
+_FACE_VARYING_FALLBACK: LinearInterpolation = "cornersPlus1"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Control:
+    """How a surface follows from its cage. face_varying: how face-varying primvars are refined."""
+
+    topology: Topology
+    face_varying: LinearInterpolation = _FACE_VARYING_FALLBACK
+
+    def equals(self, other: Control) -> bool:
+        return self.face_varying == other.face_varying and self.topology.equals(other.topology)
+
+    def triangle_count(self, level: int) -> int:
+        """Triangles at `level`, holes counted: every face becomes four, but for a first split into quads."""
+        counts, topology = self.topology.face_counts, self.topology
+        if level == 0 or topology.scheme == "loop":
+            return int((counts - 2).sum(dtype=np.int64)) * 4**level
+        return int(counts.sum(dtype=np.int64)) * 2 * 4 ** (level - 1)
+
+
+def read_control(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode, issues: list[str]) -> Control | None:
+    """None where the polygons are the surface, and where what is authored describes none."""
+    if polygons.scheme == "none" or not len(polygons.counts):
+        return None
+    try:
+        topology = _read_topology(mesh, polygons, time)
+    except ValueError as error:
+        issues.append(f"drawn without subdivision: {error}")
+        return None
+    return Control(topology, _face_varying(mesh, time, issues))
+
+
+def _read_topology(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode) -> Topology:
+    """Raises ValueError where the arrays contradict each other."""
+    return Topology(
+        face_counts=polygons.counts,
+        face_indices=polygons.indices,
+        vertex_count=len(polygons.points),
+        scheme=cast(SchemeName, polygons.scheme),
+        interpolate_boundary=cast(BoundaryRule, mesh.GetInterpolateBoundaryAttr().Get(time)),
+        triangle_subdivision_rule=cast(TriangleRule, mesh.GetTriangleSubdivisionRuleAttr().Get(time)),
+        holes=np.flatnonzero(np.isin(polygons.faces, polygons.holes)),
+        crease_indices=_indices(mesh.GetCreaseIndicesAttr(), time),
+        crease_lengths=_indices(mesh.GetCreaseLengthsAttr(), time),
+        crease_sharpnesses=_sharpnesses(mesh.GetCreaseSharpnessesAttr(), time),
+        corner_indices=_indices(mesh.GetCornerIndicesAttr(), time),
+        corner_sharpnesses=_sharpnesses(mesh.GetCornerSharpnessesAttr(), time),
+    )
+
+
+def _face_varying(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> LinearInterpolation:
+    rule = mesh.GetFaceVaryingLinearInterpolationAttr().Get(time)
+    if rule in get_args(LinearInterpolation):
+        return cast(LinearInterpolation, rule)
+    issues.append(f"faceVaryingLinearInterpolation {rule!r} is unknown; {_FACE_VARYING_FALLBACK} is taken")
+    return _FACE_VARYING_FALLBACK
+
+
+def _indices(attribute: Usd.Attribute, time: Usd.TimeCode) -> NDArray[np.integer]:
+    value = attribute.Get(time)
+    found = None if value is None else integers(value)
+    return np.empty(0, np.int32) if found is None else found
+
+
+def _sharpnesses(attribute: Usd.Attribute, time: Usd.TimeCode) -> NDArray[np.float32]:
+    value = attribute.Get(time)
+    found = None if value is None else floats(value, 1)
+    return np.empty(0, np.float32) if found is None else found

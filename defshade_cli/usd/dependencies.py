@@ -1,0 +1,42 @@
+"""The files that a stage is made of."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from pxr import Ar, Sdf, Tf, UsdUtils
+
+from defshade_cli.errors import StageError
+
+
+@dataclass(frozen=True, slots=True)
+class Dependencies:
+    """files: path on disk by name, which is relative to the stage's folder.  missing: what could not be resolved."""
+
+    files: dict[str, Path]
+    missing: tuple[str, ...]
+
+
+def read_dependencies(stage: Path) -> Dependencies:
+    """Layers, textures and other assets of a stage, through every reference, payload, clip and variant.
+
+    A package (.usdz) is one file, whatever is used of it. Raises StageError where one of the layers cannot be read.
+    """
+    delegate = UsdUtils.CoalescingDiagnosticDelegate()  # what ails the stage is logged where it is opened
+    try:
+        layers, assets, missing = UsdUtils.ComputeAllDependencies(Sdf.AssetPath(str(stage)))
+    except Tf.ErrorException as error:
+        raise StageError(f"{stage} depends on a layer that cannot be read") from error
+    finally:
+        del delegate
+    paths = {_outermost(path) for path in (*(layer.realPath for layer in layers), *assets) if path}
+    folder = stage.resolve().parent
+    files = {os.path.relpath(path, folder): Path(path) for path in paths if Path(path).is_file()}
+    elsewhere = (path for path in paths if not Path(path).is_file())
+    return Dependencies(files, tuple(sorted({*missing, *elsewhere})))
+
+
+def _outermost(path: str) -> str:
+    return os.path.realpath(Ar.SplitPackageRelativePathOuter(path)[0])

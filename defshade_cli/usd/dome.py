@@ -1,0 +1,37 @@
+"""UsdLuxDomeLight and DomeLight_1: the sky's image, and how it stands."""
+
+from __future__ import annotations
+
+import numpy as np
+from pxr import Sdf, Usd, UsdGeom, UsdLux
+
+from defshade_cli.spaces import Matrix
+
+_Z_UP = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], np.float64)
+"""The pole goes to +Z and latitude 0, longitude 0 to −Y, as DomeLight_1's schema says of a Z pole."""
+
+
+def is_dome(prim: Usd.Prim) -> bool:
+    return prim.IsA(UsdLux.DomeLight) or prim.IsA(UsdLux.DomeLight_1)
+
+
+def sky_texture(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[str | None, str | None]:
+    """The file of the sky's image at `time`; or none, and why where one is authored."""
+    asset = prim.GetAttribute("inputs:texture:file").Get(time) or Sdf.AssetPath()
+    layout = prim.GetAttribute("inputs:texture:format").Get(time)
+    if not asset.path:
+        return None, None
+    if layout not in ("automatic", "latlong"):
+        return None, f"a texture of format {layout} is ignored"
+    if not asset.resolvedPath:
+        return None, f"the texture {asset.path} is not found"
+    return asset.resolvedPath, None
+
+
+def pole(prim: Usd.Prim) -> Matrix:
+    """(4, 4) light_from_sky: DomeLight's pole is +Y, DomeLight_1's as its poleAxis says."""
+    if prim.IsA(UsdLux.DomeLight):
+        return np.eye(4)
+    axis = UsdLux.DomeLight_1(prim).GetPoleAxisAttr().Get()
+    is_z = axis == "Z" or (axis == "scene" and UsdGeom.GetStageUpAxis(prim.GetStage()) == UsdGeom.Tokens.z)
+    return _Z_UP if is_z else np.eye(4)

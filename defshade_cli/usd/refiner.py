@@ -1,0 +1,85 @@
+"""Polygons on the limit of their subdivision surface."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.usd.control import Control
+from defshade_cli.usd.normals import smooth
+from defshade_cli.usd.polygons import Polygons, Primvar
+from defshade_cli.usd.subdivision import Stencils, limit, refine, refine_face_varying
+from defshade_cli.usd.welding import weld
+
+_MOST_KEPT = 8
+"""Sets of face-varying stencils that are remembered."""
+
+
+class Refiner:
+    """The weights of one control mesh at one level, made once for the points and primvars of every frame.
+
+    Refined points are moved to the limit surface, so that every level lies on the same surface and has its exact
+    normals. Points are one a sector, see subdivision.Limit: a crease splits them, and normals stay on the points.
+    """
+
+    def __init__(self, control: Control, level: int) -> None:
+        self.control, self.level = control, level
+        self._refinement = refine(control.topology, level)
+        self._limit = limit(self._refinement)
+        self._face_varying: dict[bytes, tuple[Stencils, NDArray[np.int32]]] = {}
+
+    def fits(self, control: Control, level: int) -> bool:
+        return level == self.level and (control is self.control or control.equals(self.control))
+
+    def refine(self, cage: Polygons) -> Polygons:
+        """The surface of a cage with this topology. Holes are left out, and what no boundary rule bounds."""
+        refined = self._refinement.vertex @ np.where(np.isfinite(cage.points), cage.points, 0.0)
+        surface = replace(
+            cage,
+            points=(self._limit.position @ refined)[self._limit.vertices].astype(np.float32),
+            counts=self._refinement.face_counts,
+            indices=self._limit.sectors,
+            faces=cage.faces[self._refinement.parents],
+            holes=np.empty(0, np.int32),
+        )
+        surface = surface.with_primvars(lambda primvar: self._carried(primvar, cage))
+        return replace(surface, normals=self._normals(surface, refined)).select(~self._refinement.holes)
+
+    def _normals(self, surface: Polygons, refined: NDArray[np.float64]) -> Primvar:
+        """Exact, and from the faces where the surface has collapsed."""
+        normals = self._limit.normals(refined) * (-1.0 if surface.left_handed else 1.0)
+        collapsed = ~normals.any(axis=1)
+        if collapsed.any():
+            normals[collapsed] = smooth(surface).values[collapsed]
+        return Primvar(normals.astype(np.float32), "vertex")
+
+    def _carried(self, primvar: Primvar, cage: Polygons) -> Primvar:
+        """A primvar of the cage on the surface."""
+        values: NDArray[np.floating] = primvar.values
+        match primvar.interpolation:
+            case "constant":
+                return primvar
+            case "uniform":
+                values = values[self._refinement.parents]
+            case "vertex":
+                values = (self._limit.position @ (self._refinement.vertex @ values))[self._limit.vertices]
+            case "varying":
+                values = (self._refinement.varying @ values)[self._limit.vertices]
+            case _:
+                values = self._carried_corners(primvar.values, cage)
+        return replace(primvar, values=values.astype(np.float32))
+
+    def _carried_corners(self, values: NDArray[np.float32], cage: Polygons) -> NDArray[np.float64]:
+        """Corners with one value at one point are one, so that the primvar is smooth across their edge."""
+        number, chosen = weld(cage.indices, values)
+        key = number.tobytes()
+        if key not in self._face_varying:
+            if len(self._face_varying) == _MOST_KEPT:
+                self._face_varying.clear()
+            self._face_varying[key] = refine_face_varying(
+                self.control.topology, number, len(chosen), self.control.face_varying, self.level, at_limit=True
+            )
+        stencils, at = self._face_varying[key]
+        return (stencils @ values[chosen])[at]

@@ -1,0 +1,113 @@
+"""How often surfaces are refined: by their size in the image, within a budget, or all alike."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import stages
+from build import at, camera
+from prims import define_cube, define_mesh
+from pxr import Usd
+from stages import move
+
+from defshade_cli.plan import make_plan
+from defshade_cli.scene.scene import Scene
+from defshade_cli.settings import COMPLEXITIES, RenderSettings
+from defshade_cli.usd import complexity
+from defshade_cli.usd.complexity import EDGE_PIXELS, FINEST_LEVEL, View, choose_levels
+from defshade_cli.usd.geometry import Surface, read_surface
+
+BALL = """def Mesh "ball" {
+    point3f[] points = [(-1,-1,-1),(-1,-1,1),(-1,1,-1),(-1,1,1),(1,-1,-1),(1,-1,1),(1,1,-1),(1,1,1)]
+    int[] faceVertexCounts = [4,4,4,4,4,4]
+    int[] faceVertexIndices = [0,1,3,2, 4,6,7,5, 0,4,5,1, 2,3,7,6, 0,2,6,4, 1,5,7,3]
+    MOVE
+}
+"""
+CAMERA = 'def Camera "cam" { float2 clippingRange = (0.1, 1000)\n MOVE\n}\n'
+
+
+def ball() -> Surface:
+    surface = read_surface(define_cube("catmullClark").GetPrim(), Usd.TimeCode.Default())
+    assert surface is not None
+    return surface
+
+
+def view(height: int = 100) -> View:
+    return View(camera(5.0), height)
+
+
+def levels_of(scene: Scene) -> list[int | None]:
+    return [mesh.level for mesh in scene.meshes]
+
+
+@pytest.mark.parametrize("height", [2, 8, 30, 100, 1000])
+def test_auto_halves_edges_until_they_are_small(height: int) -> None:
+    """The face nearest to the eye is 4 away, its edge 2 long, and a unit there height / 4 pixels."""
+    surface = ball()
+    edge = 2 * height / 4
+    level = choose_levels([(surface, np.eye(4)[None])], "auto", view(height))[surface]
+    assert level == min(max(math.ceil(math.log2(edge / EDGE_PIXELS)), 0), FINEST_LEVEL)
+
+
+def test_the_nearest_and_largest_instance_counts() -> None:
+    surface = ball()
+    far = at(0, 0, -1000)
+    near = np.stack([far, np.eye(4)])
+    assert choose_levels([(surface, far[None])], "auto", view())[surface] == 0
+    both = choose_levels([(surface, far[None]), (surface, near)], "auto", view())
+    assert both == choose_levels([(surface, np.eye(4)[None])], "auto", view())
+    enlarged = far @ np.diag([300.0, 300.0, 300.0, 1.0])
+    assert choose_levels([(surface, enlarged[None])], "auto", view())[surface] > 3
+
+
+def test_a_camera_inside_a_surface_sees_it_as_fine_as_it_gets() -> None:
+    surface = ball()
+    assert choose_levels([(surface, at(0, 0, 5)[None])], "auto", view())[surface] == FINEST_LEVEL
+
+
+def test_distance_is_of_no_account_without_perspective() -> None:
+    surface, flat = ball(), View(camera(5.0, 10.0, projection="orthographic"), 100)
+    assert choose_levels([(surface, np.eye(4)[None])], "auto", flat)[surface] == 3
+    assert choose_levels([(surface, at(0, 0, -900)[None])], "auto", flat)[surface] == 3
+
+
+def test_the_budget_goes_to_the_longest_edges(monkeypatch: pytest.MonkeyPatch) -> None:
+    near, far = ball(), ball()
+    placed = [(far, at(0, 0, -60)[None]), (near, np.eye(4)[None])]
+    free = choose_levels(placed, "auto", view(1000))
+    monkeypatch.setattr(complexity, "TRIANGLE_BUDGET", 3000)
+    bounded = choose_levels(placed, "auto", view(1000))
+    assert free[near] > bounded[near] >= bounded[far]
+    assert sum(s.control.triangle_count(level) for s, level in bounded.items() if s.control) <= 3000
+
+
+@pytest.mark.parametrize("name", COMPLEXITIES[1:])
+def test_a_fixed_complexity_is_the_same_everywhere(name: str) -> None:
+    surface = ball()
+    polygons = read_surface(
+        define_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).GetPrim(), Usd.TimeCode.Default()
+    )
+    found = choose_levels([(surface, at(0, 0, -1000)[None]), (polygons, np.eye(4)[None])], name, view())
+    assert found == {surface: COMPLEXITIES.index(name) - 1, polygons: 0}
+
+
+def test_triangles_are_counted_as_they_are_made() -> None:
+    scene = stages.read(BALL.replace("MOVE", ""), complexity="high")
+    assert scene.triangle_count == 6 * 4 * 2 * 4
+
+
+def test_stages_are_refined_by_the_image_that_is_asked_for() -> None:
+    text = CAMERA.replace("MOVE", move(z=10)) + BALL.replace("MOVE", "")
+    small, large = (stages.read(text, size=(n, n)) for n in (16, 512))
+    assert levels_of(small) < levels_of(large)
+    decided = {d.subject: d for d in make_plan(large, RenderSettings(size=(512, 512))).decisions}
+    assert decided["subdivision"].choice == f"{levels_of(large)[0]} levels"
+    assert "size in the image" in decided["subdivision"].reason
+
+
+def test_our_camera_frames_the_same_however_fine_the_surface_is() -> None:
+    frames = [stages.read(BALL.replace("MOVE", ""), complexity=name).camera for name in COMPLEXITIES]
+    assert all(np.array_equal(frame.world_from_camera, frames[0].world_from_camera) for frame in frames)
