@@ -16,7 +16,7 @@ from defshade_cli.plan import make_plan
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import COMPLEXITIES, RenderSettings
 from defshade_cli.usd import complexity
-from defshade_cli.usd.complexity import EDGE_PIXELS, FINEST_LEVEL, View, choose_levels
+from defshade_cli.usd.complexity import EDGE_PIXELS, FINEST_LEVEL, FLAT_PIXELS, View, choose_levels
 from defshade_cli.usd.geometry import Surface, read_surface
 
 BALL = """def Mesh "ball" {
@@ -43,13 +43,38 @@ def levels_of(scene: Scene) -> list[int | None]:
     return [mesh.level for mesh in scene.meshes]
 
 
-@pytest.mark.parametrize("height", [2, 8, 30, 100, 1000])
-def test_auto_halves_edges_until_they_are_small(height: int) -> None:
-    """The face nearest to the eye is 4 away, its edge 2 long, and a unit there height / 4 pixels."""
+@pytest.mark.parametrize("height", [1, 2, 8, 30, 100, 1000])
+def test_auto_refines_until_edges_are_short_or_the_surface_is_flat(height: int) -> None:
+    """The face nearest to the eye is 4 away, its edge 2 long, and a unit there height / 4 pixels.
+
+    The normals at a cube's corners are along its diagonals, whose cosine is 1/3.
+    """
     surface = ball()
-    edge = 2 * height / 4
+    edge, rise = 2 * height / 4, height / 4 * 2 * math.acos(1 / 3) / 8
+    short, flat = math.log2(max(edge / EDGE_PIXELS, 1)), math.log2(max(rise / FLAT_PIXELS, 1)) / 2
     level = choose_levels([(surface, np.eye(4)[None])], "auto", view(height))[surface]
-    assert level == min(max(math.ceil(math.log2(edge / EDGE_PIXELS)), 0), FINEST_LEVEL)
+    assert level == min(math.ceil(min(short, flat)), FINEST_LEVEL)
+
+
+@pytest.mark.parametrize(
+    ("scheme", "lifted", "level"), [("catmullClark", 0, 0), ("bilinear", 0, 0), ("bilinear", 1, 4)]
+)
+def test_what_is_flat_needs_no_refinement(scheme: str, lifted: float, level: int) -> None:
+    quad = define_mesh([[-1, -1, 0], [1, -1, 0], [1, 1, lifted], [-1, 1, 0]], [[0, 1, 2, 3]], scheme)
+    surface = read_surface(quad.GetPrim(), Usd.TimeCode.Default())
+    assert surface is not None
+    assert choose_levels([(surface, np.eye(4)[None])], "auto", view(400))[surface] == level
+
+
+def test_the_rise_is_that_of_the_surface() -> None:
+    """Around a cylinder of n sides, the chord is r (1 − cos(π/n)) from the arc; the cage is outside by as much more."""
+    turn = np.linspace(0, 2 * math.pi, 33)[:-1]
+    rim = np.column_stack([np.cos(turn), np.sin(turn)])
+    points = np.concatenate([np.column_stack([rim, np.full(32, z)]) for z in (0, 0.2)])
+    faces = [[i, (i + 1) % 32, 32 + (i + 1) % 32, 32 + i] for i in range(32)]
+    surface = read_surface(define_mesh(points, faces, "catmullClark").GetPrim(), Usd.TimeCode.Default())
+    assert surface is not None
+    assert surface.rise == pytest.approx(1 - math.cos(math.pi / 32), rel=0.05)
 
 
 def test_the_nearest_and_largest_instance_counts() -> None:
@@ -70,8 +95,8 @@ def test_a_camera_inside_a_surface_sees_it_as_fine_as_it_gets() -> None:
 
 def test_distance_is_of_no_account_without_perspective() -> None:
     surface, flat = ball(), View(camera(5.0, 10.0, projection="orthographic"), 100)
-    assert choose_levels([(surface, np.eye(4)[None])], "auto", flat)[surface] == 3
-    assert choose_levels([(surface, at(0, 0, -900)[None])], "auto", flat)[surface] == 3
+    assert choose_levels([(surface, np.eye(4)[None])], "auto", flat)[surface] == 2
+    assert choose_levels([(surface, at(0, 0, -900)[None])], "auto", flat)[surface] == 2
 
 
 def test_the_budget_goes_to_the_longest_edges(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,14 +1,15 @@
 """How often subdivision surfaces are refined: as often as asked, or as the camera sees.
 
-Refined once, an edge is half as long. `auto` refines each surface until its edges, as long as they may appear where
-its nearest instance is closest to the eye, are no longer than EDGE_PIXELS: 1 to 2 pixels, as the last halving falls.
-What is out of sight counts too, because it casts shadows. Where all that would make more than TRIANGLE_BUDGET
-triangles, the surfaces with the longest edges are refined first.
+Refined once, an edge is half as long, and the polygons are a quarter as far from the surface. `auto` refines each
+surface, as it may appear where its nearest instance is closest to the eye, until its edges are no longer than
+EDGE_PIXELS or it is nearer than FLAT_PIXELS. What is out of sight counts too, because it casts shadows. Where all that
+would make more than TRIANGLE_BUDGET triangles, the surfaces that are farthest from their polygons go first.
 """
 
 from __future__ import annotations
 
 import heapq
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -24,8 +25,9 @@ UNIFORM_LEVELS: dict[Complexity, int] = {"low": 0, "medium": 1, "high": 2, "very
 """Levels everywhere, as usdrecord's complexities 1.0, 1.1, 1.2 and 1.3."""
 
 EDGE_PIXELS = 2.0
+FLAT_PIXELS = 0.1
 FINEST_LEVEL = 5
-TRIANGLE_BUDGET = 4_000_000
+TRIANGLE_BUDGET = 2_000_000
 """Of all subdivision surfaces together, each counted once however often it is placed."""
 
 
@@ -53,34 +55,48 @@ def choose_levels(
     """The level of each surface that `placed` gives with its world_from_object (N, 4, 4); 0 for polygons."""
     if complexity != "auto":
         return {s: UNIFORM_LEVELS[complexity] if s.control else 0 for s, _ in placed}
-    edges: dict[Surface, float] = {}
+    nearest: dict[Surface, float] = {}
     for surface, world_from_object in placed:
-        pixels = _edge_pixels(surface, world_from_object, view) if surface.control else 0.0
-        edges[surface] = max(pixels, edges.get(surface, 0.0))
-    return _levels_in_budget(edges)
+        nearest[surface] = max(_pixels_per_unit(surface, world_from_object, view), nearest.get(surface, 0.0))
+    return _levels_in_budget(nearest)
 
 
-def _edge_pixels(surface: Surface, world_from_object: NDArray[np.float64], view: View) -> float:
-    """How long the mean edge of the cage may appear in the nearest of its instances."""
+def _pixels_per_unit(surface: Surface, world_from_object: NDArray[np.float64], view: View) -> float:
+    """How large an object-space unit may appear in the nearest of its instances; 0 for polygons."""
+    if surface.control is None:
+        return 0.0
     scale = np.linalg.norm(world_from_object[:, :3, :3], axis=1).max(axis=1)
     density = view.pixels_per_unit(world_boxes(surface.polygons.bounds, world_from_object))
-    return surface.polygons.mean_edge * float(np.max(scale * density, initial=0.0))
+    return float(np.max(scale * density, initial=0.0))
 
 
-def _levels_in_budget(edges: Mapping[Surface, float]) -> dict[Surface, int]:
-    """Halve the longest edges, again and again."""
-    levels = dict.fromkeys(edges, 0)
-    longest = [(-pixels, order, s) for order, (s, pixels) in enumerate(edges.items()) if pixels > EDGE_PIXELS]
-    heapq.heapify(longest)
-    left = TRIANGLE_BUDGET - sum(s.control.triangle_count(0) for s in edges if s.control)
-    while longest:
-        negative, order, surface = heapq.heappop(longest)
+def _levels_in_budget(nearest: Mapping[Surface, float]) -> dict[Surface, int]:
+    """Refine what is farthest from its surface, again and again. `nearest`: pixels a unit of each."""
+    wanted = {surface: _wanted_level(surface, pixels) for surface, pixels in nearest.items()}
+    levels = dict.fromkeys(wanted, 0)
+    waiting = [(-s.rise * nearest[s], order, s) for order, (s, level) in enumerate(wanted.items()) if level]
+    heapq.heapify(waiting)
+    left = TRIANGLE_BUDGET - sum(s.control.triangle_count(0) for s in wanted if s.control)
+    while waiting:
+        distance, order, surface = heapq.heappop(waiting)
         assert surface.control is not None
         level = levels[surface]
         cost = surface.control.triangle_count(level + 1) - surface.control.triangle_count(level)
         if cost <= left:
             left -= cost
             levels[surface] = level + 1
-            if -negative / 2 > EDGE_PIXELS and level + 1 < FINEST_LEVEL:
-                heapq.heappush(longest, (negative / 2, order, surface))
+            if level + 1 < wanted[surface]:
+                heapq.heappush(waiting, (distance / 4.0, order, surface))
     return levels
+
+
+def _wanted_level(surface: Surface, pixels_per_unit: float) -> int:
+    if surface.control is None:
+        return 0
+    halvings = _halvings(surface.mean_edge * pixels_per_unit / EDGE_PIXELS)
+    quarterings = _halvings(surface.rise * pixels_per_unit / FLAT_PIXELS) / 2.0
+    return min(math.ceil(min(halvings, quarterings)), FINEST_LEVEL)
+
+
+def _halvings(excess: float) -> float:
+    return math.log2(max(excess, 1.0))

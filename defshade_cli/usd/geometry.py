@@ -7,6 +7,7 @@ Surface ── refiner ── normals ── triangulation ── subsets ──
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TypeGuard
 
 import numpy as np
@@ -15,10 +16,13 @@ from pxr import Usd, UsdGeom
 
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.scene.scene import Unsupported
+from defshade_cli.usd import flatness
 from defshade_cli.usd.control import CONTROL_ATTRIBUTES, Control, read_control
+from defshade_cli.usd.copies import Copies
 from defshade_cli.usd.gprims import read_solid, size_attributes
 from defshade_cli.usd.mesh import MESH_ATTRIBUTES, read_mesh
 from defshade_cli.usd.normals import with_normals
+from defshade_cli.usd.points import POINTS_ATTRIBUTES, read_points
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.primvars import find_display, find_uvs
 from defshade_cli.usd.refiner import Refiner
@@ -28,12 +32,13 @@ from defshade_cli.usd.triangulation import triangulate
 __all__ = ["FaceGroup", "Gprim", "Surface", "is_time_varying", "read_surface", "tessellate"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Surface:
     """A surface prim at one time, in object space, before it is cut into triangles.
 
     path: by which the prim is known.
     polygons: the surface, or the cage that `control` makes one of.
+    copies: where the prim places it; None for once, as it is.
     faces: which material group each authored face is in.
     display_color: (3,) float32, the constant authored or inherited value; None where there is none, or where it
         varies and lies on the polygons. display_opacity likewise.
@@ -47,9 +52,18 @@ class Surface:
     faces: Faces
     groups: tuple[str, ...]
     double_sided: bool
+    copies: Copies | None
     display_color: NDArray[np.float32] | None
     display_opacity: float | None
     issues: tuple[Unsupported, ...]
+
+    @cached_property
+    def mean_edge(self) -> float:
+        return flatness.mean_edge(self.polygons)
+
+    @cached_property
+    def rise(self) -> float:
+        return flatness.rise(self.polygons)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +87,7 @@ def read_surface(prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
     """
     issues: list[str] = []
     path = str(prim.GetPath())
-    polygons = _read_polygons(prim, time, issues)
+    polygons, copies = _read_shape(prim, time, issues)
     if polygons is None:
         return None
     control = read_control(UsdGeom.Mesh(prim), polygons, time, issues) if prim.IsA(UsdGeom.Mesh) else None
@@ -84,8 +98,9 @@ def read_surface(prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
         polygons=polygons,
         control=control,
         faces=faces,
-        groups=faces.groups_of(polygons.without_holes().faces),
+        groups=faces.groups_of(polygons.without_holes().faces) if copies is None or len(copies.ids) else (),
         double_sided=bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get()),
+        copies=copies,
         display_color=_constant(polygons.display_color),
         display_opacity=None if opacity is None else float(opacity),
         issues=tuple(Unsupported(path, issue) for issue in issues),
@@ -105,22 +120,33 @@ def tessellate(surface: Surface, refiner: Refiner | None = None) -> Gprim:
 
 def is_time_varying(prim: Usd.Prim) -> bool:
     """Does anything that read_surface reads, primvars inherited and face subsets included, differ over time?"""
-    names = MESH_ATTRIBUTES + CONTROL_ATTRIBUTES if prim.IsA(UsdGeom.Mesh) else size_attributes(prim)
     primvars = (
         UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals"),
+        UsdGeom.PrimvarsAPI(prim).GetPrimvar("widths"),
         find_display(prim, "displayColor"),
         find_display(prim, "displayOpacity"),
         *find_uvs(prim),
     )
     subsets = (subset.GetIndicesAttr() for subset in material_subsets(prim))
-    sources = (*(prim.GetAttribute(name) for name in names), *primvars, *subsets)
+    sources = (*(prim.GetAttribute(name) for name in _attributes(prim)), *primvars, *subsets)
     return any(source.ValueMightBeTimeVarying() for source in sources if source)
 
 
-def _read_polygons(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> Polygons | None:
+def _read_shape(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> tuple[Polygons | None, Copies | None]:
     if prim.IsA(UsdGeom.Mesh):
-        return read_mesh(UsdGeom.Mesh(prim), time, issues)
-    return read_solid(prim, time, issues)
+        return read_mesh(UsdGeom.Mesh(prim), time, issues), None
+    if prim.IsA(UsdGeom.Points):
+        return read_points(UsdGeom.Points(prim), time, issues)
+    return read_solid(prim, time, issues), None
+
+
+def _attributes(prim: Usd.Prim) -> tuple[str, ...]:
+    """What is read of a prim and may vary over time, besides primvars."""
+    if prim.IsA(UsdGeom.Mesh):
+        return MESH_ATTRIBUTES + CONTROL_ATTRIBUTES
+    if prim.IsA(UsdGeom.Points):
+        return POINTS_ATTRIBUTES
+    return size_attributes(prim)
 
 
 def _to_mesh(surface: Surface, polygons: Polygons, issues: list[str]) -> Mesh:

@@ -16,7 +16,7 @@ from pxr import Usd
 
 from defshade_cli.usd.polygons import Polygons
 from defshade_cli.usd.primvars import Elements, count_elements, read_display, read_uvs
-from defshade_cli.usd.revolution import Strip, arc, disk, revolve, side
+from defshade_cli.usd.revolution import SEGMENTS, Strip, arc, disk, revolve, side
 from defshade_cli.usd.values import floats
 
 _SPINE = {"X": 1, "Y": 2, "Z": 0}
@@ -40,8 +40,8 @@ def plane(width: float, length: float) -> Polygons:
     return _quads(corners, np.array([[0, 1, 2, 3]]))
 
 
-def sphere(radius: float) -> Polygons:
-    return revolve([arc(radius, 0.0, -math.pi / 2, math.pi / 2)])
+def sphere(radius: float, segments: int = SEGMENTS) -> Polygons:
+    return revolve([arc(radius, 0.0, -math.pi / 2, math.pi / 2, segments)], segments)
 
 
 def frustum(height: float, top: float, bottom: float) -> Polygons:

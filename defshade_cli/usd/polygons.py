@@ -78,13 +78,12 @@ class Polygons:
         return np.stack([used.min(axis=0, initial=np.inf), used.max(axis=0, initial=-np.inf)])
 
     @cached_property
-    def mean_edge(self) -> float:
-        """Root of the mean square of the edges' lengths, 0 without any; an edge counts once a face."""
+    def following(self) -> NDArray[np.intp]:
+        """(C,) the corner after each, around its face."""
         following = np.arange(1, len(self.indices) + 1)
         ends = np.cumsum(self.counts, dtype=np.intp)
         following[ends - 1] = ends - self.counts
-        points = self.points[self.indices].astype(np.float64)
-        return float(np.sqrt(np.square(points[following] - points).sum() / max(len(points), 1)))
+        return following
 
     @cached_property
     def face_of_corner(self) -> NDArray[np.int32]:

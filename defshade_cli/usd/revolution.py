@@ -33,9 +33,9 @@ class Strip:
     normals: NDArray[np.float64]
 
 
-def arc(radius: float, height: float, start: float, stop: float) -> Strip:
+def arc(radius: float, height: float, start: float, stop: float, segments: int = SEGMENTS) -> Strip:
     """Of a sphere around `height` on the spine, between two elevations in radians; ±π/2 are the poles."""
-    bands = max(1, math.ceil((stop - start) / (2.0 * math.pi) * SEGMENTS))
+    bands = max(1, math.ceil((stop - start) / (2.0 * math.pi) * segments))
     elevation = np.linspace(start, stop, bands + 1)
     normals = np.stack([np.cos(elevation), np.sin(elevation)], axis=1)
     normals[np.abs(elevation) >= math.pi / 2, 0] = 0.0
@@ -61,15 +61,15 @@ def side(bottom: float, top: float, height: float) -> Strip:
     return Strip(points, np.tile([math.cos(tilt), math.sin(tilt)], (len(points), 1)))
 
 
-def revolve(strips: Sequence[Strip]) -> Polygons:
+def revolve(strips: Sequence[Strip], segments: int = SEGMENTS) -> Polygons:
     """The solid whose profile the strips make, upwards, with a normal a point."""
     points, normals, counts, indices = [], [], [], []
     first = 0
     for strip in strips:
         poles = strip.points[:, 0] == 0.0
-        points.append(_sweep(strip.points, poles))
-        normals.append(_sweep(strip.normals, poles))
-        corners, kept = _bands(first, poles)
+        points.append(_sweep(strip.points, poles, segments))
+        normals.append(_sweep(strip.normals, poles, segments))
+        corners, kept = _bands(first, poles, segments)
         counts.append(kept.sum(axis=1))
         indices.append(corners[kept])
         first += len(points[-1])
@@ -83,30 +83,30 @@ def revolve(strips: Sequence[Strip]) -> Polygons:
     )
 
 
-def _sweep(profile: NDArray[np.float64], poles: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """(K · SEGMENTS, 3) rows of a profile (K, 2). At a pole they stand in the middle of their triangle."""
-    step = np.arange(SEGMENTS) + 0.5 * poles[:, None]
-    azimuth = step * (2.0 * math.pi / SEGMENTS)
+def _sweep(profile: NDArray[np.float64], poles: NDArray[np.bool_], segments: int) -> NDArray[np.float32]:
+    """(K · segments, 3) rows of a profile (K, 2). At a pole they stand in the middle of their triangle."""
+    step = np.arange(segments) + 0.5 * poles[:, None]
+    azimuth = step * (2.0 * math.pi / segments)
     radius, height = profile[:, :1], np.broadcast_to(profile[:, 1:], azimuth.shape)
     swept = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height], axis=-1)
     return swept.reshape(-1, 3).astype(np.float32)
 
 
-def _bands(first: int, poles: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+def _bands(first: int, poles: NDArray[np.bool_], segments: int) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """Quads (N, 4) between rows, and which of their corners count: a pole makes a triangle, two make nothing."""
-    row, segment = np.mgrid[: len(poles) - 1, :SEGMENTS]
-    after = (segment + 1) % SEGMENTS
+    row, segment = np.mgrid[: len(poles) - 1, :segments]
+    after = (segment + 1) % segments
     corners = first + np.stack(
         [
-            row * SEGMENTS + segment,
-            row * SEGMENTS + after,
-            (row + 1) * SEGMENTS + after,
-            (row + 1) * SEGMENTS + segment,
+            row * segments + segment,
+            row * segments + after,
+            (row + 1) * segments + after,
+            (row + 1) * segments + segment,
         ],
         axis=-1,
     )
     kept = np.ones(corners.shape, bool)
     kept[poles[:-1], :, 1] = False
     kept[poles[1:], :, 2] = False
-    proper = ~np.repeat(poles[:-1] & poles[1:], SEGMENTS)
+    proper = ~np.repeat(poles[:-1] & poles[1:], segments)
     return corners.reshape(-1, 4)[proper], kept.reshape(-1, 4)[proper]

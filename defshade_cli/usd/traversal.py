@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
 from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.binding import Bindings
+from defshade_cli.usd.copies import Copies, once
 from defshade_cli.usd.geometry import Surface, is_time_varying
 from defshade_cli.usd.instancing import Piece, Standing, place
 from defshade_cli.usd.kind import Kind
@@ -111,15 +111,14 @@ class Traversal:
     def _piece(
         self, prim: Usd.Prim, here: Standing, content: Surface | Light, bindings: Mapping[str, Bindings] | None = None
     ) -> Piece:
-        color = content.display_color if isinstance(content, Surface) else None
-        opacity = content.display_opacity if isinstance(content, Surface) else None
+        copies = _copies_of(content)
         return Piece(
             content,
-            matrix(here.root_from_prim)[None],
+            matrix(here.root_from_prim) @ copies.object_from_copy,
             (self._memory.shown(prim.GetPath()),),
-            np.full(1, -1, np.int32),
-            np.full((1, 3), np.nan if color is None else color, np.float32),
-            np.full(1, np.nan if opacity is None else opacity, np.float32),
+            copies.ids,
+            copies.display_color,
+            copies.display_opacity,
             here.purpose,
             bindings or {},
             here.in_world,
@@ -167,6 +166,13 @@ class Traversal:
     def _report(self, prim: Usd.Prim, *reasons: str) -> None:
         path = self._memory.shown(prim.GetPath())
         self.issues.update(dict.fromkeys(Unsupported(path, reason) for reason in reasons))
+
+
+def _copies_of(content: Surface | Light) -> Copies:
+    """Where a surface places itself; most do so once, with the colour of all of it."""
+    if not isinstance(content, Surface):
+        return once()
+    return content.copies or once(content.display_color, content.display_opacity)
 
 
 def _draw_mode(prim: Usd.Prim) -> str | None:

@@ -1,0 +1,33 @@
+"""A prim's one shape, placed as often as the prim says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Copies:
+    """Where a prim places its one shape N times.
+
+    object_from_copy: (N, 4, 4) float64.  ids: (N,) int32.
+    display_color, display_opacity: (N, 3) and (N,) float32, NaN where nothing is authored.
+    """
+
+    object_from_copy: NDArray[np.float64]
+    ids: NDArray[np.int32]
+    display_color: NDArray[np.float32]
+    display_opacity: NDArray[np.float32]
+
+
+def once(display_color: NDArray[np.float32] | None = None, display_opacity: float | None = None) -> Copies:
+    """A single copy, where the prim is."""
+    color, opacity = (np.nan if value is None else value for value in (display_color, display_opacity))
+    return Copies(
+        np.eye(4)[None],
+        np.full(1, -1, np.int32),
+        np.full((1, 3), color, np.float32),
+        np.full(1, opacity, np.float32),
+    )

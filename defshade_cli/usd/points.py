@@ -1,0 +1,89 @@
+"""UsdGeom.Points as spheres: one that is placed at every point."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+from defshade_cli.usd.copies import Copies
+from defshade_cli.usd.gprims import sphere
+from defshade_cli.usd.polygons import Polygons
+from defshade_cli.usd.primvars import Authored, authored, count_elements, fit, read_display
+from defshade_cli.usd.values import floats
+
+POINTS_ATTRIBUTES = ("points", "widths", "ids")
+"""What is read of Points that may vary over time, besides primvars."""
+
+FALLBACK_WIDTH = 1.0
+"""Where no width is authored, as in Hydra."""
+
+_SEGMENTS = ((1_000, 32), (20_000, 16))
+"""Up to how many points their spheres have how many segments around; more have the least."""
+_FEWEST_SEGMENTS = 8
+
+
+def read_points(points: UsdGeom.Points, time: Usd.TimeCode, issues: list[str]) -> tuple[Polygons, Copies]:
+    """A sphere of diameter 1, and the points that it is placed at: all that are finite."""
+    value = points.GetPointsAttr().Get(time)
+    positions = None if value is None else floats(value, 3)
+    if positions is None or not len(positions):
+        issues.append("it has no points")
+        positions = np.empty((0, 3), np.float32)
+    if points.GetNormalsAttr().HasAuthoredValue():
+        issues.append("normals of points are ignored: spheres are drawn")
+    copies = _copies(points, positions, time, issues)
+    return sphere(0.5, _segments(len(copies.ids))), copies
+
+
+def read_widths(prim: Usd.Prim, time: Usd.TimeCode) -> Authored | None:
+    """primvars:widths, else widths; None where neither is authored."""
+    primvar = authored(UsdGeom.PrimvarsAPI(prim).GetPrimvar("widths"), time)
+    attribute = prim.GetAttribute("widths")
+    if primvar is not None or not attribute.HasAuthoredValue():
+        return primvar
+    interpolation = attribute.GetMetadata("interpolation") or UsdGeom.Tokens.vertex
+    return Authored("widths", attribute.Get(time), interpolation)
+
+
+def _copies(points: UsdGeom.Points, positions: NDArray[np.float32], time: Usd.TimeCode, issues: list[str]) -> Copies:
+    prim, count = points.GetPrim(), len(positions)
+    elements = count_elements(1, count, count)
+    color = read_display(prim, "displayColor", 3, time, elements, issues)
+    opacity = read_display(prim, "displayOpacity", 1, time, elements, issues)
+    widths = _widths(prim, count, time, issues)
+    drawn = np.isfinite(positions).all(axis=1) & np.isfinite(widths)
+    if not drawn.all():
+        issues.append(f"{np.count_nonzero(~drawn)} points are left out: they are not finite")
+    return Copies(
+        _placed(positions, widths)[drawn],
+        np.arange(count, dtype=np.int32)[drawn],
+        np.broadcast_to(np.float32(np.nan) if color is None else color.values, (count, 3))[drawn],
+        np.broadcast_to(np.float32(np.nan) if opacity is None else opacity.values, (count,))[drawn],
+    )
+
+
+def _widths(prim: Usd.Prim, count: int, time: Usd.TimeCode, issues: list[str]) -> NDArray[np.float32]:
+    """(count,) one a point. A single value serves all, whatever its interpolation."""
+    source = read_widths(prim, time)
+    value = None if source is None or source.value is None else floats(source.value, 1)
+    if value is not None and len(value) == 1:
+        return np.repeat(np.abs(value), count)
+    widths = fit(source, 1, count_elements(1, count, count), issues)
+    if widths is None:
+        issues.append(f"no widths that fit: {FALLBACK_WIDTH:g} is taken")
+        return np.full(count, FALLBACK_WIDTH, np.float32)
+    return np.abs(np.broadcast_to(widths.values, (count,)))
+
+
+def _placed(positions: NDArray[np.float32], widths: NDArray[np.float32]) -> NDArray[np.float64]:
+    """(N, 4, 4)"""
+    matrices = np.zeros((len(positions), 4, 4))
+    matrices[:, [0, 1, 2], [0, 1, 2]] = widths[:, None]
+    matrices[:, :3, 3] = positions
+    matrices[:, 3, 3] = 1.0
+    return matrices
+
+
+def _segments(count: int) -> int:
+    return next((segments for most, segments in _SEGMENTS if count <= most), _FEWEST_SEGMENTS)
