@@ -3,10 +3,10 @@
 Reach of a light. Outside its volume a light may add no more than its share of `light_tolerance` to a pixel, so that
 all that is dropped stays below it. With the far field I/d² and a bound K on BRDF · NoL of the scene's materials,
 
-    reach² = exposure · I_max · K · lights / light_tolerance,    K = 1/π + 1/(2π α³)
+    reach² = exposure · I_max · K · lights / light_tolerance,    K = 1/π + 1/(2π α³) + clearcoat/(2π αc³)
 
-(GGX: D ≤ 1/(πα²); height-correlated Smith: V·NoL ≤ 1/(2α); F ≤ 1; α the least of the scene). No light reaches
-further than the geometry does.
+(GGX: D ≤ 1/(πα²); both visibility terms: V·NoL ≤ 1/(2α); F ≤ 1; the greatest K of the scene's materials). No light
+reaches further than the geometry does.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from defshade_cli.image.layers import LAYERS
 from defshade_cli.passes.planes import PLANES, Plane, needed_planes
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.light import DistantLight, DomeLight, Light
+from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Complexity, Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
@@ -178,14 +179,21 @@ def volume_of(light: Light) -> Volume:
 
 def _plan_lights(scene: Scene, exposure: float, settings: RenderSettings) -> tuple[PlannedLight, ...]:
     lit = [light for light in scene.lights if _peak(light) > 0.0]
-    alpha = min((max(m.roughness**2, _MIN_ALPHA) for m in scene.materials), default=1.0)
-    response = 1.0 / math.pi + 1.0 / (2.0 * math.pi * alpha**3)
+    response = max((_greatest_response(m, settings.shading) for m in scene.materials), default=1.0)
     share = settings.light_tolerance / max(len(lit), 1)
     order: dict[str, int] = {"quad": 0, "sphere": 1, "cone": 2}
     planned = [
         PlannedLight(light, volume_of(light), _reach(light, scene.bounds, exposure * response / share)) for light in lit
     ]
     return tuple(sorted(planned, key=lambda p: order[p.volume]))
+
+
+def _greatest_response(material: Material, shading: Shading) -> float:
+    """K of this file's first lines, each lobe with its own α; the classic equation has no coat."""
+    lobes = [(1.0, material.roughness)]
+    if shading == "preview-surface":
+        lobes.append((material.clearcoat, material.clearcoat_roughness))
+    return sum(amount / max(roughness**2, _MIN_ALPHA) ** 3 for amount, roughness in lobes) / math.tau + 1.0 / math.pi
 
 
 def _peak(light: Light) -> float:
