@@ -47,6 +47,7 @@ struct Light {
     vec2 response;             // multipliers of the diffuse and of the specular lobe
     uint first_shadow;         // shadow map, the first of six for a light that sees all around
     uint shadow_count;         // 0: casts none
+    uint is_sky;               // one of the few directions that stand for a dome
 };
 
 struct ShadowMap {
