@@ -3,10 +3,10 @@
 Reach of a light. Outside its volume a light may add no more than its share of `light_tolerance` to a pixel, so that
 all that is dropped stays below it. With the far field I/d² and a bound K on BRDF · NoL of the scene's materials,
 
-    reach² = exposure · I_max · K · lights / light_tolerance,    K = 1/π + 1/(2π α³)
+    reach² = exposure · I_max · K · lights / light_tolerance,    K = 1/π + 1/(2π α³) + clearcoat/(2π αc³)
 
-(GGX: D ≤ 1/(πα²); height-correlated Smith: V·NoL ≤ 1/(2α); F ≤ 1; α the least of the scene). No light reaches
-further than the geometry does.
+(GGX: D ≤ 1/(πα²); both visibility terms: V·NoL ≤ 1/(2α); F ≤ 1; the greatest K of the scene's materials). No light
+reaches further than the geometry does.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from defshade_cli.image.layers import LAYERS
 from defshade_cli.passes.planes import PLANES, Plane, needed_planes
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.light import DistantLight, DomeLight, Light
+from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Complexity, Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
@@ -61,7 +62,8 @@ class Plan:
     camera: conformed to the image.  clip: (near, far), the camera's range tightened to the geometry.
     exposure: linear, the camera's and the settings' together.
     planes: of the GBuffer; lights: sorted quads, spheres, cones.
-    shadows: some light casts them.  background: domes are seen where no geometry is.  cutout: some opacity is below 1.
+    shadows: some light casts them.  background: domes are seen where no geometry is.
+    cutout: some opacity may be below 1.  textures: some material reads them.
     data_pass: data layers need an unjittered float GBuffer of their own.
     levels: how often subdivision surfaces were refined, ascending; empty without any.
     """
@@ -79,6 +81,7 @@ class Plan:
     shadows: bool
     background: bool
     cutout: bool
+    textures: bool
     data_pass: bool
     complexity: Complexity
     levels: tuple[int, ...]
@@ -138,6 +141,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         shadows=shadows,
         background=settings.background,
         cutout=cutout,
+        textures=bool(scene.textures),
         data_pass=data_pass,
         complexity=settings.complexity,
         levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None})),
@@ -151,7 +155,7 @@ def _check_layers(names: tuple[str, ...]) -> None:
 
 
 def _has_cutout(scene: Scene) -> bool:
-    if any(m.opacity < 1.0 or m.opacity_threshold > 0.0 for m in scene.materials):
+    if any(m.opacity < 1.0 or m.opacity_threshold > 0.0 or "opacity" in m.inputs for m in scene.materials):
         return True
     varying = [m.display_opacity for m in scene.meshes if m.display_opacity is not None]
     constant = [d.display_opacity for d in scene.drawables]
@@ -178,14 +182,25 @@ def volume_of(light: Light) -> Volume:
 
 def _plan_lights(scene: Scene, exposure: float, settings: RenderSettings) -> tuple[PlannedLight, ...]:
     lit = [light for light in scene.lights if _peak(light) > 0.0]
-    alpha = min((max(m.roughness**2, _MIN_ALPHA) for m in scene.materials), default=1.0)
-    response = 1.0 / math.pi + 1.0 / (2.0 * math.pi * alpha**3)
+    response = max((_greatest_response(m, settings.shading) for m in scene.materials), default=1.0)
     share = settings.light_tolerance / max(len(lit), 1)
     order: dict[str, int] = {"quad": 0, "sphere": 1, "cone": 2}
     planned = [
         PlannedLight(light, volume_of(light), _reach(light, scene.bounds, exposure * response / share)) for light in lit
     ]
     return tuple(sorted(planned, key=lambda p: order[p.volume]))
+
+
+def _greatest_response(material: Material, shading: Shading) -> float:
+    """K of this file's first lines, each lobe with its own α; the classic equation has no coat.
+
+    What an image holds is not known here: it may be the worst.
+    """
+    lobes = [(1.0, 0.0 if "roughness" in material.inputs else material.roughness)]
+    if shading == "preview-surface":
+        amount = 1.0 if "clearcoat" in material.inputs else material.clearcoat
+        lobes.append((amount, 0.0 if "clearcoat_roughness" in material.inputs else material.clearcoat_roughness))
+    return sum(amount / max(roughness**2, _MIN_ALPHA) ** 3 for amount, roughness in lobes) / math.tau + 1.0 / math.pi
 
 
 def _peak(light: Light) -> float:
@@ -212,7 +227,8 @@ def _explain(plan: Plan) -> Iterator[Decision]:
         yield Decision(f"{volume} volumes", f"{count} drawn" if count else "skipped", "lights that reach geometry")
     yield _kept("shadow maps", plan.shadows, "a light casts them", "no light casts any, or none were asked")
     yield _kept("environment", bool(plan.domes), "a dome lights the scene", "no dome")
-    yield _kept("cutout", plan.cutout, "some opacity is below 1", "no opacity is below 1")
+    yield _kept("cutout", plan.cutout, "some opacity is or may be below 1", "no opacity is below 1")
+    yield _kept("textures", plan.textures, "a material reads them", "no material reads any")
     if any(LAYERS[name].source != "lighting" for name in plan.layers):
         jittered, shared = "the beauty's is jittered, quantised or dithered", "the beauty's own float sample serves"
         yield _kept("data GBuffer", plan.data_pass or not plan.lit, jittered if plan.lit else "as asked", shared)

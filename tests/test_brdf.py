@@ -21,12 +21,18 @@ from defshade_cli.settings import SHADINGS, Shading
 from defshade_cli.spaces import normalize
 
 ROUGHNESSES = (0.0, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
-COSINES = (1.0, 0.7, 0.4, 0.1, 0.02)
+COSINES = (1.0, 0.7, 0.4, 0.2, 0.1, 0.05, 0.02, 0.005)
 FURNACE_POINTS = 1 << 13
 FURNACE_ERROR = 1e-3
 """Of the quadrature with so many directions: a white Lambertian, whose albedo is 1, measures it below."""
-WHITE_DIELECTRIC = {"preview-surface": 1.90, "classic": 1.96}
-"""What a white dielectric may return at the most grazing view: docs/lighting.md tells why this passes 1."""
+DIELECTRICS = {
+    "ior 1, 1.5, 2.5": (0.0, 0.04, (1.5 / 3.5) ** 2),
+    "specularColor": (0.3, 0.6, 1.0),
+}
+"""F0 of three white dielectrics at once, one a channel."""
+FLOAT32_ROUNDING = 2.0**-23
+COATS = ((0.0, 0.2), (0.2, 0.0), (0.35, 0.35), (0.05, 1.0), (1.0, 0.05), (0.5, 0.1))
+"""Roughness of the coat and of what lies under it."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +40,7 @@ class Model:
     """One reflection model in one implementation.
 
     precision: relative error of its arithmetic at roughness 0.1 and up.
+    reciprocity: relative, of f(l, v) against f(v, l).
     narrow_precision: of D at roughness 0, whose lobe is 1e-4 wide where float32 directions are 6e-8 apart.
     """
 
@@ -41,6 +48,7 @@ class Model:
     evaluate: Callable[..., NDArray[np.float64]]
     distribution: Callable[[Surface, NDArray], NDArray[np.float64]]
     precision: float
+    reciprocity: float
     narrow_precision: float
 
 
@@ -53,13 +61,21 @@ def implementation(request: pytest.FixtureRequest) -> Literal["float64", "gpu"]:
     return request.param
 
 
+@pytest.fixture
+def implementation_of(request: pytest.FixtureRequest, implementation: str) -> Callable[[Shading], Model]:
+    def model_of(shading: Shading) -> Model:
+        if implementation == "float64":
+            evaluate = partial(brdf.evaluate_brdf, shading=shading)
+            return Model(shading, evaluate, _float64_distribution, 1e-9, 1e-12, 1e-4)
+        harness = BrdfHarness(request.getfixturevalue("gpu"), shading)
+        return Model(shading, harness.evaluate_brdf, harness.distribution, 2e-5, 32 * FLOAT32_ROUNDING, 1e-3)
+
+    return model_of
+
+
 @pytest.fixture(params=SHADINGS)
-def model(request: pytest.FixtureRequest, implementation: str) -> Model:
-    if implementation == "float64":
-        evaluate = partial(brdf.evaluate_brdf, shading=request.param)
-        return Model(request.param, evaluate, _float64_distribution, 1e-9, 1e-4)
-    harness = BrdfHarness(request.getfixturevalue("gpu"), request.param)
-    return Model(request.param, harness.evaluate_brdf, harness.distribution, 2e-5, 1e-3)
+def model(request: pytest.FixtureRequest, implementation_of: Callable[[Shading], Model]) -> Model:
+    return implementation_of(request.param)
 
 
 def _random_directions(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
@@ -109,12 +125,12 @@ def test_distribution_of_normals_integrates_to_one(model: Model, roughness: floa
 
 
 def test_reflection_is_reciprocal(model: Model) -> None:
-    surface = _random_surface(4000, seed=1)
+    surface = _random_surface(20000, seed=1, roughness=(0.0, 1.0))
     light = _around(np.random.default_rng(2), surface.normal)
     forward = model.evaluate(surface, light) / np.sum(surface.normal * light, axis=-1)[:, None]
     backward = model.evaluate(replace(surface, view=light), surface.view)
     backward = backward / np.sum(surface.normal * surface.view, axis=-1)[:, None]
-    np.testing.assert_allclose(forward, backward, rtol=max(1e-6, model.precision), atol=1e-6)
+    np.testing.assert_allclose(forward, backward, rtol=model.reciprocity, atol=1e-9)
 
 
 def test_nothing_is_reflected_below_the_horizon(model: Model) -> None:
@@ -137,16 +153,44 @@ def test_white_metal_returns_at_most_what_it_receives(model: Model, roughness: f
     assert albedos.max() <= 1.0 + FURNACE_ERROR
 
 
+@pytest.mark.parametrize("kind", DIELECTRICS)
 @pytest.mark.parametrize("roughness", ROUGHNESSES)
-def test_white_dielectric_gains_no_more_than_documented(model: Model, roughness: float) -> None:
+def test_white_dielectric_returns_at_most_what_it_receives(model: Model, roughness: float, kind: str) -> None:
+    material = replace(furnace.dielectric(1.0, roughness), f0=np.array([DIELECTRICS[kind]]))
+    assert _white_furnace(model, material).max() <= 1.0 + FURNACE_ERROR
+
+
+@pytest.mark.parametrize("roughness", ROUGHNESSES)
+def test_white_plastic_keeps_its_light(model: Model, roughness: float) -> None:
+    """The bound is not met by darkening: ior 1.5 loses 5 % at most, and a little more within 6° of its silhouette."""
     albedos = _white_furnace(model, furnace.dielectric(1.0, roughness))
-    assert albedos.min() > 0.95
-    assert albedos.max() <= WHITE_DIELECTRIC[model.shading]
+    assert albedos[np.array(COSINES) >= 0.1].min() > 0.95
+    assert albedos.min() > (0.7 if model.shading == "classic" else 0.9)
+
+
+@pytest.mark.parametrize("metallic", [0.25, 0.75])
+@pytest.mark.parametrize("roughness", ROUGHNESSES)
+def test_half_metal_returns_at_most_what_it_receives(model: Model, roughness: float, metallic: float) -> None:
+    f0 = np.full((1, 3), 0.04 + 0.96 * metallic)
+    material = replace(furnace.dielectric(1.0, roughness), metallic=np.full(1, metallic), f0=f0)
+    assert _white_furnace(model, material).max() <= 1.0 + FURNACE_ERROR
+
+
+@pytest.mark.parametrize("amount", [0.5, 1.0])
+@pytest.mark.parametrize(("coat_roughness", "roughness"), COATS)
+@pytest.mark.parametrize("base", ["metal", "dielectric"])
+def test_coated_surface_returns_at_most_what_it_receives(
+    implementation_of: Callable[[Shading], Model], base: str, coat_roughness: float, roughness: float, amount: float
+) -> None:
+    bare = furnace.metal(1.0, roughness) if base == "metal" else furnace.dielectric(1.0, roughness)
+    coated = replace(bare, clearcoat=np.full(1, amount), clearcoat_roughness=np.full(1, coat_roughness))
+    assert _white_furnace(implementation_of("preview-surface"), coated).max() <= 1.0 + FURNACE_ERROR
 
 
 def _white_furnace(model: Model, material: Surface) -> NDArray[np.float64]:
+    """(V, 3) by view."""
     albedo = partial(furnace.directional_albedo, model.evaluate, material, points=FURNACE_POINTS)
-    return np.array([albedo(cosine)[0] for cosine in COSINES])
+    return np.array([albedo(cosine) for cosine in COSINES])
 
 
 @pytest.mark.parametrize("roughness", ROUGHNESSES)

@@ -51,6 +51,18 @@ def test_no_light_reaches_further_than_the_geometry() -> None:
     assert plan.lights[0].reach == pytest.approx(math.sqrt(1 + 1 + 16), rel=2e-3)
 
 
+def test_a_narrow_coat_carries_a_light_further_than_the_rough_surface_below_it() -> None:
+    def reach(**options: object) -> float:
+        rough = replace(GREY, roughness=1.0, **options)  # type: ignore[arg-type]
+        wide = scene([quad(half=1e4)], [bulb(0, 0, 3)], [rough])
+        return make_plan(wide, RenderSettings(light_tolerance=1e-3)).lights[0].reach
+
+    assert reach() == reach(clearcoat_roughness=0.1)
+    assert reach(clearcoat=1.0, clearcoat_roughness=1.0) == pytest.approx(reach() * math.sqrt(4 / 3))
+    assert reach(clearcoat=1.0, clearcoat_roughness=0.5) == pytest.approx(reach() * math.sqrt(67 / 3))
+    assert reach(clearcoat=1.0) > 1e4
+
+
 def test_the_clipping_range_is_tightened_to_the_geometry_and_never_widened() -> None:
     plan = make_plan(SCENE, RenderSettings())
     assert plan.clip == pytest.approx((4.0, 6.0), rel=2e-3)

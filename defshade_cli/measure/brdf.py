@@ -6,6 +6,7 @@ from the surface, cosines are (...,), colours are (..., 3); everything broadcast
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,22 @@ MIN_NOV = 1e-4
 COAT_F0 = 0.04
 """Normal reflectance of the clearcoat: ior 1.5 whatever the base's ior is."""
 CLASSIC_DIELECTRIC_F0 = 0.03
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeFit:
+    """The four constants of `edge_bound`."""
+
+    a: float
+    b: float
+    c: float
+    d: float
+
+
+SMITH_GGX = EdgeFit(0.157, 3.167, 14.64, 0.2199)
+"""Of V_SmithGGXCorrelated, as `python -m defshade_cli.measure.albedo` prints it."""
+SMITH_SCHLICK = EdgeFit(0.0, 3.108, 22.64, 0.2103)
+"""Of V_SmithSchlick."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,6 +72,11 @@ class Angles:
     noh: Array
     voh: Array
 
+    @property
+    def grazing(self) -> Array:
+        """The lesser of NoV and NoL."""
+        return np.minimum(self.nov, self.nol)
+
     @classmethod
     def between(cls, n: Array, v: Array, l: Array) -> Angles:  # noqa: E741
         h = normalize(v + l)
@@ -85,9 +107,30 @@ def G1_SchlickSmith(cosine: Array, k: Array) -> Array:
     return cosine / (cosine * (1.0 - k) + k)
 
 
+def V_SmithSchlick(nov: Array, nol: Array, alpha: Array) -> Array:
+    """Schlick's G1 on both sides, k = alpha / 2, over 4 NoV NoL."""
+    k = alpha / 2.0
+    return G1_SchlickSmith(nov, k) * G1_SchlickSmith(nol, k) / (4.0 * nov * nol)
+
+
 def F_Schlick(f0: Array | float, f90: Array | float, voh: Array) -> Array:
     """Schlick 1994, eq. 15, with the edge colour `f90`; the cosine gains a trailing axis for colours."""
     return f0 + (f90 - f0) * np.power(1.0 - voh[..., None], 5)
+
+
+def edge_bound(mu: Array, alpha: Array, fit: EdgeFit) -> Array:
+    """At least the directional albedo of (1 − VoH)⁵ in a GGX lobe, falling in the cosine `mu`."""
+    n = alpha + mu * (fit.a + fit.b * mu)
+    return (1.0 - mu) * ((1.0 - mu) ** 4 * n + fit.d * alpha * mu) / (n + fit.c * alpha**2)
+
+
+def E_bound(f0: Array | float, f90: Array | float, mu: Array, alpha: Array, fit: EdgeFit) -> Array:
+    """At least the directional albedo of a lobe with F_Schlick; the cosine gains a trailing axis for colours.
+
+    The white lobe's part, W ≤ 1 − ln 2 · α² μ, is exact at normal incidence on alpha 1.
+    """
+    white = 1.0 - math.log(2.0) * alpha**2 * mu
+    return f0 * white[..., None] + (f90 - f0) * edge_bound(mu, alpha, fit)[..., None]
 
 
 def evaluate_brdf(
@@ -106,25 +149,29 @@ def preview_surface(surface: Surface, angles: Angles, response: tuple[float, flo
     """UsdPreviewSurface: Lambert under a GGX lobe, both under an optional white coat."""
     fresnel = F_Schlick(surface.f0, surface.f90, angles.voh)
     specular = _microfacets(surface.roughness, angles)[..., None] * fresnel
+    taken = E_bound(surface.f0, surface.f90, angles.grazing, alpha_from_roughness(surface.roughness), SMITH_GGX)
     albedo = surface.base * (1.0 - surface.metallic[..., None])
-    diffuse = albedo / np.pi * (1.0 - fresnel)
+    diffuse = albedo / np.pi * (1.0 - np.maximum(fresnel, taken))
 
-    coat_fresnel = surface.clearcoat[..., None] * F_Schlick(COAT_F0, 1.0, angles.voh)
-    coat = _microfacets(surface.clearcoat_roughness, angles)[..., None] * coat_fresnel
-    return (diffuse * response[0] + specular * response[1]) * (1.0 - coat_fresnel) + coat * response[1]
+    amount = surface.clearcoat[..., None]
+    coat_fresnel = F_Schlick(COAT_F0, 1.0, angles.voh)
+    coat = _microfacets(surface.clearcoat_roughness, angles)[..., None] * coat_fresnel * amount
+    coat_taken = E_bound(COAT_F0, 1.0, angles.grazing, alpha_from_roughness(surface.clearcoat_roughness), SMITH_GGX)
+    below = 1.0 - amount * np.maximum(coat_fresnel, coat_taken)
+    return (diffuse * response[0] + specular * response[1]) * below + coat * response[1]
 
 
 def classic(surface: Surface, angles: Angles, response: tuple[float, float]) -> Array:
-    """The model this project started from, with its three defects mended: see docs/lighting.md."""
+    """The model this project started from, with its defects mended: see docs/lighting.md."""
     metallic = surface.metallic[..., None]
     real_albedo = surface.base - surface.base * metallic
     real_specular = (1.0 - metallic) * CLASSIC_DIELECTRIC_F0 + metallic * surface.base
 
     alpha = alpha_from_roughness(surface.roughness)
-    geometry = G1_SchlickSmith(angles.nov, alpha / 2.0) * G1_SchlickSmith(angles.nol, alpha / 2.0)
-    lobe = D_GGX(alpha, angles.noh) * geometry / (4.0 * angles.nol * angles.nov)
+    lobe = D_GGX(alpha, angles.noh) * V_SmithSchlick(angles.nov, angles.nol, alpha)
     specular = lobe[..., None] * F_Schlick(real_specular, 1.0, angles.voh)
-    diffuse = real_albedo / np.pi * np.maximum(1.0 - specular, 0.0)
+    taken = E_bound(real_specular, 1.0, angles.grazing, alpha, SMITH_SCHLICK)
+    diffuse = real_albedo / np.pi * np.maximum(1.0 - np.maximum(specular, taken), 0.0)
     return diffuse * response[0] + specular * response[1]
 
 

@@ -21,18 +21,21 @@ Reflect = Callable[[Surface, NDArray[np.float64]], NDArray[np.float64]]
 def directional_albedo(reflect: Reflect, material: Surface, cos_view: float, *, points: int = 1 << 15) -> Array:
     """(3,) ∫ f NoL dl over the hemisphere, the surface seen at `cos_view` from its normal.
 
-    material: one point, whose roughness picks the quadrature. Two sets of `points` directions,
-    cosine-weighted ones and reflections at GGX half vectors, are joined by the balance heuristic (Veach 1997,
-    sec. 9.2.2), so that lobes of any width converge.
+    material: one point, whose lobes pick the quadrature. Sets of `points` directions, cosine-weighted ones and
+    reflections at the half vectors of each lobe, are joined by the balance heuristic (Veach 1997, sec. 9.2.2), so
+    that lobes of any width converge.
     """
     view = np.array([np.sqrt(1.0 - cos_view**2), 0.0, cos_view])
-    alpha = alpha_from_roughness(material.roughness)
-    directions = np.concatenate([_cosine_directions(points), _lobe_directions(points, alpha, view)])
+    alphas = [alpha_from_roughness(material.roughness)]
+    if material.clearcoat.any():
+        alphas.append(alpha_from_roughness(material.clearcoat_roughness))
+    sets = [_cosine_directions(points), *(_lobe_directions(points, alpha, view) for alpha in alphas)]
+    directions = np.concatenate(sets)
     directions = directions[directions[:, 2] > 0.0]
 
     half = normalize(view + directions)
     noh, voh = half[:, 2], half @ view
-    density = directions[:, 2] / np.pi + D_GGX(alpha, noh) * noh / (4.0 * voh)
+    density = directions[:, 2] / np.pi + sum(D_GGX(alpha, noh) * noh / (4.0 * voh) for alpha in alphas)
     reflected = reflect(seen_from(material, view, len(directions)), directions)
     return (reflected / density[:, None]).sum(axis=0) / points
 
@@ -66,25 +69,25 @@ def _point(base: float, metallic: float, roughness: float, f0: float, f90: float
     )  # fmt: skip
 
 
-def _fibonacci_lattice(points: int) -> tuple[Array, Array]:
+def fibonacci_lattice(points: int) -> tuple[Array, Array]:
     """u in (0, 1) and an angle in [0, 2π): evenly spread, and along no edge of what is integrated."""
     index = np.arange(points)
     turn = 2.0 / (1.0 + math.sqrt(5.0))
     return (index + 0.5) / points, 2.0 * np.pi * np.modf(index * turn)[0]
 
 
-def _spherical(cos_theta: Array, phi: Array) -> Array:
+def spherical(cos_theta: Array, phi: Array) -> Array:
     sin_theta = np.sqrt(np.maximum(1.0 - cos_theta**2, 0.0))
     return np.stack([sin_theta * np.cos(phi), sin_theta * np.sin(phi), cos_theta], axis=-1)
 
 
 def _cosine_directions(points: int) -> Array:
-    u, phi = _fibonacci_lattice(points)
-    return _spherical(np.sqrt(u), phi)
+    u, phi = fibonacci_lattice(points)
+    return spherical(np.sqrt(u), phi)
 
 
 def _lobe_directions(points: int, alpha: Array, view: Array) -> Array:
     """`view` mirrored at half vectors distributed as D · NoH (Walter et al. 2007, eq. 35)."""
-    u, phi = _fibonacci_lattice(points)
-    half = _spherical(1.0 / np.sqrt(1.0 + alpha**2 * u / (1.0 - u)), phi)
+    u, phi = fibonacci_lattice(points)
+    half = spherical(1.0 / np.sqrt(1.0 + alpha**2 * u / (1.0 - u)), phi)
     return 2.0 * (half @ view)[:, None] * half - view

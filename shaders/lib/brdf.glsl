@@ -34,3 +34,17 @@ vec3 F_Schlick(vec3 f0, vec3 f90, float VoH) {
     float x2 = x * x;
     return f0 + (f90 - f0) * (x2 * x2 * x);
 }
+
+// At least the directional albedo of a lobe with F_Schlick: F0 W + (F90 - F0) B, W of a white lobe and B of its edge
+// weight (1 - VoH)^5. W <= 1 - ln 2 alpha^2 mu; B's constants come from defshade_cli/measure/albedo.py.
+vec3 E_bound(vec3 f0, vec3 f90, float mu, float alpha, vec4 fit) {
+    float y = 1.0 - mu;
+    float y2 = y * y;
+    float n = alpha + mu * (fit.x + fit.y * mu);
+    float a2 = alpha * alpha;
+    float edge = y * (y2 * y2 * n + fit.w * alpha * mu) / (n + fit.z * a2);
+    return f0 * (1.0 - 0.6931 * a2 * mu) + (f90 - f0) * edge;
+}
+
+const vec4 SMITH_GGX = vec4(0.157, 3.167, 14.64, 0.2199);
+const vec4 SMITH_SCHLICK = vec4(0.0, 3.108, 22.64, 0.2103);
