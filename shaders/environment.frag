@@ -6,18 +6,31 @@
 uniform vec2 response;             // of the diffuse and of the specular lobe
 out vec4 radiance;
 
-// One sample without noise: irradiance by spherical harmonics, the specular lobe by a blurred sky. No shadows.
-vec3 analytic_reflection(Surface s, vec3 v) {
+// The part of a lobe that this pass shows: all of it in a single sample, else what sampled directions would miss.
+float share(float roughness) {
+#ifdef ANALYTIC
+    return 1.0;
+#else
+    return sharpness(roughness);
+#endif
+}
+
+// A lobe's mirror image of the sky, as blurred as the lobe is wide. No shadows.
+vec3 mirrored_sky(vec3 n, vec3 v, float roughness) {
+    return share(roughness) * response.y * sky_radiance(reflect(-v, n), lobe_lod(GGX_alpha(roughness)));
+}
+
+vec3 reflected_sky(Surface s, vec3 v) {
     float NoV = max(dot(s.normal, v), MIN_NOV);
-    float alpha = GGX_alpha(s.roughness);
-    vec3 specular = lobe_albedo(s.f0, s.f90, s.roughness, NoV);
-    vec3 diffuse = s.base * ((1.0 - s.metallic) / PI) * (1.0 - specular) * sky_irradiance(s.normal);
-    vec3 mirrored = reflect(-v, s.normal);
-    vec3 result = diffuse * response.x + specular * response.y * sky_radiance(mirrored, lobe_lod(alpha));
+    vec3 albedo = E_bound(s.f0, s.f90, NoV, GGX_alpha(s.roughness), SMITH_GGX);
+    vec3 result = albedo * mirrored_sky(s.normal, v, s.roughness);
+#ifdef ANALYTIC
+    result += s.base * ((1.0 - s.metallic) / PI) * (1.0 - albedo) * response.x * sky_irradiance(s.normal);
+#endif
 #ifdef PLANE_CLEARCOAT
-    float coat = s.clearcoat * lobe_albedo(vec3(DEFAULT_F0), vec3(1.0), s.clearcoat_roughness, NoV).x;
-    float lod = lobe_lod(GGX_alpha(s.clearcoat_roughness));
-    result = result * (1.0 - coat) + coat * response.y * sky_radiance(mirrored, lod);
+    float coat_alpha = GGX_alpha(s.clearcoat_roughness);
+    float coat = s.clearcoat * E_bound(vec3(DEFAULT_F0), vec3(1.0), NoV, coat_alpha, SMITH_GGX).x;
+    result = result * (1.0 - coat) + coat * mirrored_sky(s.normal, v, s.clearcoat_roughness);
 #endif
     return result;
 }
@@ -32,7 +45,5 @@ void main() {
 #ifdef BACKGROUND
     if (!covered) radiance = vec4(view.exposure * sky_radiance(-v, 0.0), 1.0);
 #endif
-#ifdef ANALYTIC
-    if (covered) radiance.rgb = view.exposure * analytic_reflection(read_planes(pixel), v);
-#endif
+    if (covered) radiance.rgb = view.exposure * reflected_sky(read_planes(pixel), v);
 }

@@ -7,6 +7,17 @@
 flat in uint light_index;
 out vec4 radiance;
 
+// What of each lobe a light may show: the environment pass shows a dome in the sharp ones.
+vec3 lobe_response(Light light, Surface s) {
+    vec3 response = light.response.xyy;
+    if (light.is_sky == 0u) return response;
+#ifdef PLANE_CLEARCOAT
+    response.z *= 1.0 - sharpness(s.clearcoat_roughness);
+#endif
+    response.y *= 1.0 - sharpness(s.roughness);
+    return response;
+}
+
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     float stored = texelFetch(plane_depth, pixel, 0).x;
@@ -17,6 +28,6 @@ void main() {
     if (irradiance == vec3(0.0)) discard;
     Surface surface = read_planes(pixel);
     irradiance *= visibility(lights[light_index], position, surface.normal, l);
-    vec3 f = evaluate_brdf(surface, direction_to_eye(position), l, lights[light_index].response);
+    vec3 f = evaluate_brdf(surface, direction_to_eye(position), l, lobe_response(lights[light_index], surface));
     radiance = vec4(view.exposure * irradiance * f, 0.0);
 }

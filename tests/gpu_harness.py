@@ -41,7 +41,7 @@ void main() {{
                         p.clearcoat, p.clearcoat_roughness);
     vec3 h = normalize(p.view + p.light);
     float D = D_GGX(GGX_alpha(s.roughness), dot(s.normal, h), s.normal, h);
-    results[i] = vec4(evaluate_brdf(s, p.view, p.light, p.response), D);
+    results[i] = vec4(evaluate_brdf(s, p.view, p.light, p.response.xyy), D);
 }}
 """
 

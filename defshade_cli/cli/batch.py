@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from defshade_cli.cli.arguments import option_arguments
 from defshade_cli.cli.jobfile import JOB_SUFFIXES, read_job_file
 from defshade_cli.cli.options import (
     Function,
@@ -42,6 +43,7 @@ _EPILOG = epilog(
     "defshade batch shots/*.usda --frames 1:240 -o 'renders/{scene}/{scene}.####.exr'",
     "defshade batch nightly.yaml --existing skip --retries 2 --stats nightly.json",
     "defshade batch nightly.yaml --samples 1 --dry-run",
+    "defshade batch nightly.yaml --emit openjd > job.yaml",
 )
 
 
@@ -54,6 +56,7 @@ class Schedule:
     retries: int
     keep_going: bool
     dry_run: bool
+    emit: str | None
 
 
 def _takes_jobs(function: Function) -> Function:
@@ -112,6 +115,11 @@ def _batch_options() -> list[Function]:
             help="Whether the other frames are rendered after one has failed for good.",
         ),
         option("--dry-run", is_flag=True, help="Print the tasks and render nothing."),
+        option(
+            "--emit",
+            type=click.Choice(["openjd"]),
+            help="Print the batch as an Open Job Description template, for a farm to render.",
+        ),
     ]
 
 
@@ -132,7 +140,9 @@ def batch(jobs: Sequence[RenderJob], reporting: Reporting, schedule: Schedule) -
     frames = frame_count(jobs)
     workers = schedule.workers or default_workers(frames)
     chunks = make_chunks(jobs, schedule.chunk or chunk_size(frames, workers))
-    if schedule.dry_run:
+    if schedule.emit:
+        _emit(jobs)
+    elif schedule.dry_run:
         for chunk in chunks:
             click.echo(_task_line(chunk))
     else:
@@ -161,6 +171,16 @@ def _render(
                     click.echo(path)
         if tally.failures:
             raise BatchError(tally.verdict)
+
+
+def _emit(jobs: Sequence[RenderJob]) -> None:
+    import yaml
+
+    from defshade_cli.farm.openjd import make_template
+
+    params = click.get_current_context().command.params
+    template = make_template((job, option_arguments(job, params)) for job in jobs)
+    click.echo(yaml.safe_dump(template, sort_keys=False, width=110), nl=False)
 
 
 def _task_line(chunk: Chunk) -> str:

@@ -1,7 +1,7 @@
 """The environment pass: what domes show behind the geometry, and in a frame of one sample their light on it.
 
 With more samples, directions drawn from the sky light the geometry like distant lights, with shadows
-(passes/emitters.py); this pass then draws the background alone.
+(passes/emitters.py); this pass then draws the background, and the sky's image in lobes too sharp for them.
 """
 
 from __future__ import annotations

@@ -125,6 +125,7 @@ def light_records(
         row["profile"], row["intensity"] = _PROFILES.index(emitter.profile), emitter.intensity
         row["response"] = (planned.light.diffuse, planned.light.specular)
         row["reach"] = planned.reach
+        row["is_sky"] = planned.light.kind == "dome"
         _set_shaping(row, planned.light.shaping)
     if shadows:
         records["first_shadow"], records["shadow_count"] = shadows.first, shadows.count

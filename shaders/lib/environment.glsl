@@ -30,11 +30,3 @@ float lobe_lod(float alpha) {
     float texel = PI / float(textureSize(sky, 0).y);
     return max(log2(2.0 * atan(alpha) / texel), 0.0);
 }
-
-// Karis 2014, "Physically Based Shading on Mobile": the specular lobe's directional albedo.
-vec3 lobe_albedo(vec3 f0, vec3 f90, float roughness, float NoV) {
-    vec4 r = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
-    float a = min(r.x * r.x, exp2(-9.28 * NoV)) * r.x + r.y;
-    vec2 ab = vec2(-1.04, 1.04) * a + r.zw;
-    return f0 * ab.x + f90 * ab.y;
-}

@@ -27,6 +27,11 @@ void set_metallic_fresnel(inout Surface s, float dielectric_f0) {
     s.f0 = mix(dielectric_f0 * s.f90, s.f90, s.metallic);
 }
 
+// 1 for lobes too narrow for a sample's few directions of a sky to find, 0 for wide ones.
+float sharpness(float roughness) {
+    return 1.0 - smoothstep(0.25, 0.45, roughness);
+}
+
 struct Angles {
     float NoV, NoL, NoH, VoH;
 };
@@ -36,8 +41,8 @@ Angles angles_between(vec3 n, vec3 v, vec3 l, vec3 h) {
 }
 
 // UsdPreviewSurface as its schema describes it, but that no lobe leaves more light below it than it has not taken:
-// docs/lighting.md. `response` scales the diffuse and the specular lobe.
-vec3 brdf_preview_surface(Surface s, Angles a, vec3 h, vec2 response) {
+// docs/lighting.md. `response` scales the diffuse, the specular and the coat's lobe.
+vec3 brdf_preview_surface(Surface s, Angles a, vec3 h, vec3 response) {
     float alpha = GGX_alpha(s.roughness);
     vec3 F = F_Schlick(s.f0, s.f90, a.VoH);
     float mu = min(a.NoV, a.NoL);
@@ -50,13 +55,13 @@ vec3 brdf_preview_surface(Surface s, Angles a, vec3 h, vec2 response) {
     float coat_F = F_Schlick(vec3(DEFAULT_F0), vec3(1.0), a.VoH).x;
     float coat_taken = max(coat_F, E_bound(vec3(DEFAULT_F0), vec3(1.0), mu, coat_alpha, SMITH_GGX).x);
     float coat = D_GGX(coat_alpha, a.NoH, s.normal, h) * V_SmithGGXCorrelated(a.NoV, a.NoL, coat_alpha) * coat_F;
-    result = result * (1.0 - s.clearcoat * coat_taken) + s.clearcoat * coat * response.y;
+    result = result * (1.0 - s.clearcoat * coat_taken) + s.clearcoat * coat * response.z;
 #endif
     return result;
 }
 
 // The seed's lighting equation with its defects mended: docs/lighting.md.
-vec3 brdf_classic(Surface s, Angles a, vec3 h, vec2 response) {
+vec3 brdf_classic(Surface s, Angles a, vec3 h, vec3 response) {
     float alpha = GGX_alpha(s.roughness);
     vec3 real_albedo = s.base - s.base * s.metallic;
     vec3 real_specular = mix(vec3(0.03), s.base, s.metallic);
@@ -67,7 +72,7 @@ vec3 brdf_classic(Surface s, Angles a, vec3 h, vec2 response) {
 }
 
 // The BRDF times NoL, for unit vectors towards the eye and the light.
-vec3 evaluate_brdf(Surface s, vec3 v, vec3 l, vec2 response) {
+vec3 evaluate_brdf(Surface s, vec3 v, vec3 l, vec3 response) {
     vec3 h = normalize(v + l);
     Angles a = angles_between(s.normal, v, l, h);
     if (a.NoL <= 0.0) return vec3(0.0);
