@@ -12,6 +12,7 @@ from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.geometry import Drawable, Mesh, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import Material
+from defshade_cli.scene.texture import Texture
 from defshade_cli.spaces import ConformPolicy
 
 
@@ -52,6 +53,11 @@ class Scene:
     def bounds(self) -> NDArray[np.float64]:
         """(2, 3) world-space box around every drawable; (+inf, −inf) for a scene without geometry."""
         return enclose(world_boxes(self.meshes[d.mesh].bounds, d.world_from_object) for d in self.drawables)
+
+    @cached_property
+    def textures(self) -> tuple[Texture, ...]:
+        """All that the materials read, each once."""
+        return tuple(dict.fromkeys(i.texture for material in self.materials for i in material.inputs.values()))
 
     @cached_property
     def triangle_count(self) -> int:
