@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.errors import UsageError
+from defshade_cli.gpu.planes import PLANES, Plane, needed_planes
 from defshade_cli.image.layers import LAYERS
-from defshade_cli.passes.planes import PLANES, Plane, needed_planes
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.light import DistantLight, DomeLight, Light
 from defshade_cli.scene.material import Material
@@ -62,7 +62,8 @@ class Plan:
     camera: conformed to the image.  clip: (near, far), the camera's range tightened to the geometry.
     exposure: linear, the camera's and the settings' together.
     planes: of the GBuffer; lights: sorted quads, spheres, cones.
-    shadows: some light casts them.  background: domes are seen where no geometry is.  cutout: some opacity is below 1.
+    shadows: some light casts them.  background: domes are seen where no geometry is.
+    cutout: some opacity may be below 1.  textures: some material reads them.
     data_pass: data layers need an unjittered float GBuffer of their own.
     levels: how often subdivision surfaces were refined, ascending; empty without any.
     """
@@ -80,6 +81,7 @@ class Plan:
     shadows: bool
     background: bool
     cutout: bool
+    textures: bool
     data_pass: bool
     complexity: Complexity
     levels: tuple[int, ...]
@@ -139,6 +141,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         shadows=shadows,
         background=settings.background,
         cutout=cutout,
+        textures=bool(scene.textures),
         data_pass=data_pass,
         complexity=settings.complexity,
         levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None})),
@@ -152,7 +155,7 @@ def _check_layers(names: tuple[str, ...]) -> None:
 
 
 def _has_cutout(scene: Scene) -> bool:
-    if any(m.opacity < 1.0 or m.opacity_threshold > 0.0 for m in scene.materials):
+    if any(m.opacity < 1.0 or m.opacity_threshold > 0.0 or "opacity" in m.inputs for m in scene.materials):
         return True
     varying = [m.display_opacity for m in scene.meshes if m.display_opacity is not None]
     constant = [d.display_opacity for d in scene.drawables]
@@ -189,10 +192,14 @@ def _plan_lights(scene: Scene, exposure: float, settings: RenderSettings) -> tup
 
 
 def _greatest_response(material: Material, shading: Shading) -> float:
-    """K of this file's first lines, each lobe with its own α; the classic equation has no coat."""
-    lobes = [(1.0, material.roughness)]
+    """K of this file's first lines, each lobe with its own α; the classic equation has no coat.
+
+    What an image holds is not known here: it may be the worst.
+    """
+    lobes = [(1.0, 0.0 if "roughness" in material.inputs else material.roughness)]
     if shading == "preview-surface":
-        lobes.append((material.clearcoat, material.clearcoat_roughness))
+        amount = 1.0 if "clearcoat" in material.inputs else material.clearcoat
+        lobes.append((amount, 0.0 if "clearcoat_roughness" in material.inputs else material.clearcoat_roughness))
     return sum(amount / max(roughness**2, _MIN_ALPHA) ** 3 for amount, roughness in lobes) / math.tau + 1.0 / math.pi
 
 
@@ -220,7 +227,8 @@ def _explain(plan: Plan) -> Iterator[Decision]:
         yield Decision(f"{volume} volumes", f"{count} drawn" if count else "skipped", "lights that reach geometry")
     yield _kept("shadow maps", plan.shadows, "a light casts them", "no light casts any, or none were asked")
     yield _kept("environment", bool(plan.domes), "a dome lights the scene", "no dome")
-    yield _kept("cutout", plan.cutout, "some opacity is below 1", "no opacity is below 1")
+    yield _kept("cutout", plan.cutout, "some opacity is or may be below 1", "no opacity is below 1")
+    yield _kept("textures", plan.textures, "a material reads them", "no material reads any")
     if any(LAYERS[name].source != "lighting" for name in plan.layers):
         jittered, shared = "the beauty's is jittered, quantised or dithered", "the beauty's own float sample serves"
         yield _kept("data GBuffer", plan.data_pass or not plan.lit, jittered if plan.lit else "as asked", shared)

@@ -1,25 +1,26 @@
 #include "lib/view.glsl"
 #include "lib/surface.glsl"
 #include "lib/cutout.glsl"
+#include "lib/material.glsl"
+#ifdef TEXTURES
+#include "lib/texture.glsl"
+#endif
 #include "generated/planes.glsl"
-
-layout(std430, binding = 2) readonly buffer MaterialBlock { Material materials[]; };
 
 in vec3 normal_relative;
 in vec4 display_color;
 flat in uint material_index;
 flat in uint instance_index;
 flat in float handedness;
+#ifdef TEXTURES
+in vec3 position_relative;
+in vec4 uv;
+#endif
 
-vec3 facing_normal() {
-    float side = gl_FrontFacing ? handedness : -handedness;
-    return normalize(normal_relative) * side;
-}
-
-Surface surface_of(Material material) {
+Surface surface_of(Material material, vec3 normal) {
     Surface s;
-    s.normal = facing_normal();
-    s.base = material.uses_display_color != 0u ? display_color.rgb : material.diffuse_color;
+    s.normal = normal;
+    s.base = material.diffuse_color;
     s.metallic = material.metallic;
     s.roughness = material.roughness;
     s.emission = material.emissive_color;
@@ -35,9 +36,14 @@ Surface surface_of(Material material) {
 }
 
 void main() {
-    Material material = materials[material_index];
-#ifdef CUTOUT
-    if (is_cut_out(material, display_color.a, instance_index)) discard;
+    Material material = material_at(material_index, display_color);
+    vec3 normal = normalize(normal_relative);
+#ifdef TEXTURES
+    apply_textures(material, normal, position_relative, uv);
 #endif
-    write_planes(surface_of(material));
+#ifdef CUTOUT
+    if (is_cut_out(material, instance_index)) discard;
+#endif
+    float side = gl_FrontFacing ? handedness : -handedness;
+    write_planes(surface_of(material, side * normal));
 }

@@ -7,6 +7,9 @@ in vec3 normal_object;
 #ifdef DISPLAY_COLOR_VARIES
 in vec4 vertex_color;          // alpha is opacity; negative: the instance's value counts
 #endif
+#ifdef TEXTURES
+in vec4 vertex_uv;             // two sets
+#endif
 in uvec2 draw;                 // instance, material
 
 out vec3 normal_relative;
@@ -14,6 +17,10 @@ out vec4 display_color;
 flat out uint material_index;
 flat out uint instance_index;
 flat out float handedness;
+#ifdef TEXTURES
+out vec3 position_relative;
+out vec4 uv;
+#endif
 
 void main() {
     Instance instance = instances[draw.x];
@@ -27,5 +34,9 @@ void main() {
     instance_index = draw.x;
     material_index = draw.y;
     handedness = instance.handedness;
+#ifdef TEXTURES
+    position_relative = position.xyz;
+    uv = vertex_uv;
+#endif
     gl_Position = view.clip_from_relative * vec4(position.xyz, 1.0);
 }

@@ -10,6 +10,10 @@ in uvec2 draw;                 // instance, material
 #ifdef DISPLAY_COLOR_VARIES
 in vec4 vertex_color;
 #endif
+#ifdef TEXTURES
+in vec4 vertex_uv;
+out vec4 uv;
+#endif
 out float display_opacity;
 flat out uint material_index;
 flat out uint instance_index;
@@ -22,6 +26,9 @@ void main() {
 #ifdef CUTOUT
     instance_index = draw.x;
     material_index = draw.y;
+#ifdef TEXTURES
+    uv = vertex_uv;
+#endif
     display_opacity = instance.display_opacity;
 #ifdef DISPLAY_COLOR_VARIES
     if (vertex_color.a >= 0.0) display_opacity = vertex_color.a;

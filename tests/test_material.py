@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import Path
+
 import numpy as np
 import pytest
 from stages import material_names, reasons, stage_of
 
 from defshade_cli.scene.material import UNBOUND, Material
 from defshade_cli.scene.scene import Scene
+from defshade_cli.scene.texture import ImageFile, Texture, TextureInput
 from defshade_cli.usd.reader import StageReader
+from defshade_cli.usd.stage import open_stage
 
 BINDS = '(prepend apiSchemas = ["MaterialBindingAPI"])'
 
@@ -154,7 +159,7 @@ def test_a_reader_of_another_primvar_falls_back() -> None:
 def test_a_texture_falls_back_channel_by_channel() -> None:
     text = surface("m", FROM_TEXTURE, TEXTURE.format(fallback="float4 inputs:fallback = (1, 0.25, 0, 1)"))
     assert of_cube(text) == Material("/m", diffuse_color=(1, 0.25, 0), roughness=0.25)
-    assert issues(text) == ["not read: diffuseColor (UsdUVTexture), roughness (UsdUVTexture)"]
+    assert issues(text) == ["not read: diffuseColor (no file wood.png), roughness (no file wood.png)"]
 
 
 def test_a_texture_without_fallback_leaves_the_schemas_default() -> None:
@@ -164,6 +169,70 @@ def test_a_texture_without_fallback_leaves_the_schemas_default() -> None:
 def test_a_material_is_reported_once() -> None:
     cubes = "".join(f'def Cube "c{i}" {BINDS} {{\nrel material:binding = </m>\n}}\n' for i in range(3))
     assert len(reasons(read(surface("m", FROM_TEXTURE, TEXTURE.format(fallback="")) + cubes), "/m")) == 1
+
+
+COORDINATES = """def Shader "turn" {
+    uniform token info:id = "UsdTransform2d"
+    float2 inputs:in.connect = </m/coordinates.outputs:result>
+    float inputs:rotation = 90
+    float2 inputs:scale = (2, 3)
+    float2 inputs:translation = (4, 5)
+    float2 outputs:result
+}
+def Shader "coordinates" {
+    uniform token info:id = "UsdPrimvarReader_float2"
+    string inputs:varname.connect = </m.inputs:set>
+    float2 outputs:result
+}"""
+
+
+def network(folder: Path, file: str, more: str = "") -> str:
+    """A stage in `folder` whose cube reads its colour and roughness from `file`."""
+    image = TEXTURE.format(fallback=more).replace("wood.png", file)
+    image = image.replace(
+        "float3 outputs:rgb", "float2 inputs:st.connect = </m/turn.outputs:result>\nfloat3 outputs:rgb"
+    )
+    material = surface("m", FROM_TEXTURE, f"{image}\n{COORDINATES}").replace("{", '{\nstring inputs:set = "map"', 1)
+    stage = folder / "stage.usda"
+    stage.write_text(f'#usda 1.0\n{material}\ndef Cube "cube" {BINDS} {{\nrel material:binding = </m>\n}}')
+    return str(stage)
+
+
+def read_inputs(stage: str) -> Mapping[str, TextureInput]:
+    scene = StageReader(open_stage(Path(stage))).read(None)
+    assert scene.unsupported == ()
+    return scene.materials[0].inputs
+
+
+def test_a_texture_with_its_coordinates_is_read(tmp_path: Path) -> None:
+    (tmp_path / "wood.png").touch()
+    options = """token inputs:wrapS = "mirror"
+    token inputs:sourceColorSpace = "raw"
+    float4 inputs:scale = (2, 2, 2, 1)
+    float4 inputs:bias = (-1, -1, -1, 0)"""
+    inputs = read_inputs(network(tmp_path, "wood.png", options))
+    color, roughness = inputs["diffuse_color"], inputs["roughness"]
+    file = ImageFile(str(tmp_path / "wood.png"))
+    assert color.texture == Texture(((1001, file),), color_space="raw", wrap_s="mirror", wrap_t="useMetadata")
+    assert (color.channel, roughness.channel, color.uv) == ("rgb", "g", "map")
+    assert (color.scale, color.bias) == ((2, 2, 2, 1), (-1, -1, -1, 0))
+    np.testing.assert_allclose(color.texture_from_uv, [[0, -3, 4], [2, 0, 5]], atol=1e-12)
+
+
+def test_back_slashes_and_udim_sets_are_resolved(tmp_path: Path) -> None:
+    (tmp_path / "maps").mkdir()
+    for name in ("wood.png", "tile.1001.png", "tile.1012.png"):
+        (tmp_path / "maps" / name).touch()
+    slashed = read_inputs(network(tmp_path, r"maps\wood.png"))["diffuse_color"].texture
+    assert Path(slashed.tiles[0][1].path) == tmp_path / "maps" / "wood.png"
+    tiles = read_inputs(network(tmp_path, "maps/tile.<UDIM>.png"))["diffuse_color"].texture
+    assert tiles.udim
+    assert [number for number, _ in tiles.tiles] == [1001, 1012]
+
+
+def test_occlusion_is_nothing_to_report() -> None:
+    text = surface("m", "float inputs:occlusion.connect = </m/image.outputs:g>", TEXTURE.format(fallback=""))
+    assert issues(text) == []
 
 
 @pytest.mark.parametrize(

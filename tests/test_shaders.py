@@ -11,7 +11,7 @@ from defshade_cli.resources import SHADERS
 
 
 def test_an_include_is_pasted_once() -> None:
-    text = assemble("gbuffer.frag", generated={"generated/planes.glsl": ""}).text
+    text = assemble("gbuffer.frag", generated={"generated/planes.glsl": "", "generated/textures.glsl": ""}).text
     assert text.count("struct View {") == 1
     assert text.count("const float PI") == 1
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from defshade_cli.cli.arguments import option_arguments
 from defshade_cli.cli.jobfile import JOB_SUFFIXES, read_job_file
 from defshade_cli.cli.options import (
     Function,
@@ -30,10 +31,13 @@ from defshade_cli.cli.options import (
 from defshade_cli.cli.progress import frame_name, make_progress, start_logging
 from defshade_cli.cli.table import BatchTable
 from defshade_cli.cli.tally import Tally
-from defshade_cli.errors import BatchError
+from defshade_cli.cli.types import Amount
+from defshade_cli.errors import BatchError, UsageError
 from defshade_cli.settings import RenderJob
 
 if TYPE_CHECKING:
+    from defshade_cli.farm.dask import DaskEngine
+    from defshade_cli.farm.local import LocalEngine
     from defshade_cli.farm.tasks import Chunk
 
 TERMINATED = 143  # 128 + SIGTERM, as shells have it
@@ -42,6 +46,8 @@ _EPILOG = epilog(
     "defshade batch shots/*.usda --frames 1:240 -o 'renders/{scene}/{scene}.####.exr'",
     "defshade batch nightly.yaml --existing skip --retries 2 --stats nightly.json",
     "defshade batch nightly.yaml --samples 1 --dry-run",
+    "defshade batch nightly.yaml --emit openjd > job.yaml",
+    "defshade batch nightly.yaml --engine dask --scheduler tcp://farm:8786 --resource GPU=1",
 )
 
 
@@ -54,6 +60,10 @@ class Schedule:
     retries: int
     keep_going: bool
     dry_run: bool
+    emit: str | None
+    engine: str
+    scheduler: str | None
+    resources: tuple[tuple[str, float], ...]
 
 
 def _takes_jobs(function: Function) -> Function:
@@ -111,7 +121,33 @@ def _batch_options() -> list[Function]:
             default_text="--keep-going",
             help="Whether the other frames are rendered after one has failed for good.",
         ),
+        option(
+            "--engine",
+            type=click.Choice(["local", "dask"]),
+            default="local",
+            default_text="local",
+            help="Where frames are rendered: processes of this machine, or a Dask cluster.",
+        ),
+        option(
+            "--scheduler",
+            metavar="ADDRESS",
+            default_text="a cluster on this machine",
+            help="Dask's scheduler to join, such as tcp://farm:8786.",
+        ),
+        option(
+            "--resource",
+            "resources",
+            type=Amount(),
+            multiple=True,
+            metavar="NAME=N",
+            help="What a Dask worker must have to spare for a chunk, such as GPU=1; repeatable.",
+        ),
         option("--dry-run", is_flag=True, help="Print the tasks and render nothing."),
+        option(
+            "--emit",
+            type=click.Choice(["openjd"]),
+            help="Print the batch as an Open Job Description template, for a farm to render.",
+        ),
     ]
 
 
@@ -127,12 +163,16 @@ def batch(jobs: Sequence[RenderJob], reporting: Reporting, schedule: Schedule) -
     from defshade_cli.farm.local import default_workers
     from defshade_cli.farm.tasks import check_batch, chunk_size, frame_count, make_chunks
 
+    if schedule.engine != "dask" and (schedule.scheduler or schedule.resources):
+        raise UsageError("--scheduler and --resource are for --engine dask")
     start_logging(reporting)
     check_batch(jobs)
     frames = frame_count(jobs)
     workers = schedule.workers or default_workers(frames)
     chunks = make_chunks(jobs, schedule.chunk or chunk_size(frames, workers))
-    if schedule.dry_run:
+    if schedule.emit:
+        _emit(jobs)
+    elif schedule.dry_run:
         for chunk in chunks:
             click.echo(_task_line(chunk))
     else:
@@ -144,13 +184,10 @@ def _render(
     jobs: Sequence[RenderJob], chunks: Sequence[Chunk], workers: int, reporting: Reporting, schedule: Schedule
 ) -> None:
     from defshade_cli.farm.batch import run_batch
-    from defshade_cli.farm.local import LocalEngine
     from defshade_cli.farm.tasks import frame_count, leaving_no_leftovers
 
-    level = "INFO" if reporting.verbose else "WARNING"
-    command = shlex.join(["defshade", *sys.argv[1:]])
     with make_progress(reporting, frame_count(jobs), BatchTable) as progress, Tally(jobs, reporting) as tally:
-        with leaving_no_leftovers(jobs), LocalEngine(workers, command=command, log_level=level) as engine:
+        with leaving_no_leftovers(jobs), _make_engine(workers, reporting, schedule) as engine:
             for outcome in run_batch(chunks, engine, retries=schedule.retries, keep_going=schedule.keep_going):
                 tally.add(outcome)
                 if outcome.error:
@@ -161,6 +198,31 @@ def _render(
                     click.echo(path)
         if tally.failures:
             raise BatchError(tally.verdict)
+
+
+def _make_engine(workers: int, reporting: Reporting, schedule: Schedule) -> LocalEngine | DaskEngine:
+    from defshade_cli.farm.dask import DaskEngine
+    from defshade_cli.farm.local import LocalEngine
+
+    level = "INFO" if reporting.verbose else "WARNING"
+    command = shlex.join(["defshade", *sys.argv[1:]])
+    if schedule.engine == "local":
+        return LocalEngine(workers, command=command, log_level=level)
+    resources = dict(schedule.resources)
+    engine = DaskEngine(schedule.scheduler, workers, resources=resources, command=command, log_level=level)
+    if not reporting.quiet:
+        click.echo(f"Dask's dashboard: {engine.dashboard}", err=True)
+    return engine
+
+
+def _emit(jobs: Sequence[RenderJob]) -> None:
+    import yaml
+
+    from defshade_cli.farm.openjd import make_template
+
+    params = click.get_current_context().command.params
+    template = make_template((job, option_arguments(job, params)) for job in jobs)
+    click.echo(yaml.safe_dump(template, sort_keys=False, width=110), nl=False)
 
 
 def _task_line(chunk: Chunk) -> str:

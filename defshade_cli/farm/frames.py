@@ -4,6 +4,7 @@
     1:10x2      every second                10:1x-3     10, 7, 4, 1
     101:102x0.25   fractional frames        1:10x2,15   both, in this order
 
+`openjd:1-10:2,15` is what Open Job Description's tasks name a chunk of frames, with its own meaning: 1 3 5 7 9 15.
 `1-10x2` is read as `1:10x2`. `1-10` and `1-10:2` are refused, because what the colon steps over differs between tools.
 """
 
@@ -14,10 +15,14 @@ from decimal import Decimal
 
 from defshade_cli.errors import UsageError
 
+OPENJD = "openjd:"
+"""Before a range expression of Open Job Description."""
+
 MOST_FRAMES = 1_000_000
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 _SPEC = re.compile(rf"({_NUMBER})(?:(?::({_NUMBER})(?:x({_NUMBER}))?)|(?:-({_NUMBER})x({_NUMBER})))?")
+_OPENJD_RANGE = re.compile(r"(-?\d+)(?:-(-?\d+)(?::(-?\d+))?)?")
 _DASHED = re.compile(rf"({_NUMBER})-({_NUMBER})(?::({_NUMBER}))?")
 
 
@@ -26,7 +31,9 @@ def parse_frames(text: str) -> tuple[float, ...]:
 
     Steps are added in decimal, so `0:1x0.1` holds 0.3 and not 0.30000000000000004. Raises UsageError.
     """
-    specs = [part.strip() for part in text.split(",")]
+    specs = [part.strip() for part in text.removeprefix(OPENJD).split(",")]
+    if text.startswith(OPENJD):
+        specs = [_from_openjd(spec) for spec in specs]
     frames = dict.fromkeys(frame for spec in specs for frame in _expand(spec))
     return tuple(frames)
 
@@ -47,6 +54,15 @@ def _expand(spec: str) -> list[float]:
     if count > MOST_FRAMES:
         raise UsageError(f"frames '{spec}': {count} frames; the limit is {MOST_FRAMES}")
     return [float(first + index * stride) + 0.0 for index in range(count)]
+
+
+def _from_openjd(spec: str) -> str:
+    """`1-10:2` → `1:10x2`."""
+    match = _OPENJD_RANGE.fullmatch(spec)
+    if match is None:
+        raise UsageError(f"frames '{OPENJD}{spec}': write a frame (12), a range (1-10) or a stepped one (1-10:2)")
+    first, last, step = match.groups()
+    return first + (f":{last}" if last else "") + (f"x{step}" if step else "")
 
 
 def _refusal(spec: str) -> str:

@@ -27,6 +27,7 @@ LIBEGL = os.environ.get("DEFSHADE_LIBEGL", "libEGL.so.1")
 _REQUIRED_VERSION = 450
 _UPPER_LEFT, _ZERO_TO_ONE = 0x8CA2, 0x935F
 _TEXTURE_2D, _DEPTH_COMPONENT, _DEPTH_COMPONENT32F, _FLOAT = 0x0DE1, 0x1902, 0x8CAC, 0x1406
+_TEXTURE_2D_ARRAY, _SRGB8_ALPHA8, _RGBA, _UNSIGNED_BYTE = 0x8C1A, 0x8C43, 0x1908, 0x1401
 DEPTH_CLAMP = 0x864F
 
 Releasable = TypeVar("Releasable", bound=Any)
@@ -90,6 +91,27 @@ class Gpu:
         texture.compare_func = ""
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         return texture
+
+    def texture_array(
+        self, size: tuple[int, int, int], components: int, dtype: str, *, srgb: bool = False
+    ) -> moderngl.TextureArray:
+        """An empty texture array of (width, height, layers); srgb: of 8-bit RGBA, decoded as it is sampled.
+
+        moderngl knows no sRGB arrays; the storage is specified anew under the same name. Raises GpuError where memory
+        ends.
+        """
+        try:
+            array = self.context.texture_array(size, components, dtype=dtype)
+        except moderngl.Error as error:
+            raise GpuError(f"no room for {size[2]} textures of {size[0]}x{size[1]}: {error}") from error
+        if srgb:
+            bind = self._entry_point("glBindTexture", ctypes.c_uint, ctypes.c_uint)
+            specify = self._entry_point(
+                "glTexImage3D", *[ctypes.c_uint] * 2, *[ctypes.c_int] * 5, *[ctypes.c_uint] * 2, ctypes.c_void_p
+            )
+            bind(_TEXTURE_2D_ARRAY, array.glo)
+            specify(_TEXTURE_2D_ARRAY, 0, _SRGB8_ALPHA8, *size, 0, _RGBA, _UNSIGNED_BYTE, None)
+        return array
 
     def _entry_point(self, name: str, *arguments: Any) -> Callable[..., None]:
         address = self._get_address(name.encode())

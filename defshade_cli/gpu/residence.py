@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.records import record
+from defshade_cli.gpu.textures import TextureSet, TextureStore, input_records
+from defshade_cli.gpu.vertices import UvNames, uv_names, vertex_arrays
 from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 
-VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS = range(5)
+VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS, TEXTURE_INPUTS, TILES = range(7)
 """Binding points of the storage buffers, as the shaders declare them."""
 
 _COMMAND = np.dtype([(name, "u4") for name in ("count", "instances", "first_index", "base_vertex", "base_instance")])
@@ -58,6 +60,12 @@ class DrawList:
     table: NDArray
     corners: NDArray[np.float64]
     color_varies: bool
+    textures: TextureSet
+
+    @property
+    def texture_groups(self) -> int:
+        """Samplers that a program needs for the textures; 0 where there are none."""
+        return len(self.textures.arrays)
 
 
 class GpuScene:
@@ -67,25 +75,45 @@ class GpuScene:
         self._gpu = gpu
         self._instances = RecordBuffer(gpu, INSTANCES)
         self._materials = RecordBuffer(gpu, MATERIALS)
+        self._texture_inputs = RecordBuffer(gpu, TEXTURE_INPUTS)
+        self._tiles = RecordBuffer(gpu, TILES)
+        self._textures = TextureStore(gpu)
         self._meshes: tuple[Mesh, ...] | None = None
+        self._uv_names: tuple[UvNames, ...] = ()
         self._pool: list[moderngl.Buffer] = []
         self._draws: list[moderngl.Buffer] = []
 
     def update(self, scene: Scene) -> DrawList:
         """Make the scene's geometry, placements and materials resident, relative to its camera."""
         self._instances.write(instance_records(scene.drawables, scene.camera.position))
-        self._materials.write(material_records(scene.materials))
+        textures = self._update_materials(scene)
         color_varies = any(m.display_color is not None or m.display_opacity is not None for m in scene.meshes)
-        if self._meshes is None or not _same(self._meshes, scene.meshes):
-            self._pool = self._replaced(self._pool, _vertex_arrays(scene.meshes, color_varies))
-            self._meshes = scene.meshes
+        textured = bool(textures.arrays)
+        uvs = uv_names(scene.drawables, scene.materials, len(scene.meshes)) if textured else ()
+        if self._meshes is None or not _same(self._meshes, scene.meshes) or uvs != self._uv_names:
+            arrays = vertex_arrays(scene.meshes, uvs, color_varies=color_varies, textured=textured)
+            self._pool = self._replaced(self._pool, arrays)
+            self._meshes, self._uv_names = scene.meshes, uvs
         commands, rows = draw_commands(scene.drawables, scene.meshes)
         self._draws = self._replaced(self._draws, [commands, rows])
-        positions, normals, indices, *colors = self._pool
+        positions, normals, indices, *varying = self._pool
         vertices = [(positions, "3f", "position_object"), (normals, "3f", "normal_object")]
-        vertices += [(buffer, "4f", "vertex_color") for buffer in colors]
+        names = ["vertex_color"] * color_varies + ["vertex_uv"] * textured
+        vertices += [(buffer, "4f", name) for buffer, name in zip(varying, names, strict=True)]
         vertices.append((self._draws[1], "2u4/i", "draw"))
-        return DrawList(tuple(vertices), indices, self._draws[0], commands, command_corners(scene), color_varies)
+        corners = command_corners(scene)
+        return DrawList(
+            tuple(vertices), indices, self._draws[0], commands, corners, color_varies=color_varies, textures=textures
+        )
+
+    def _update_materials(self, scene: Scene) -> TextureSet:
+        textures = self._textures.update(scene.textures)
+        inputs, counts = input_records(scene.materials, textures)
+        self._materials.write(material_records(scene.materials, counts))
+        if textures.arrays:
+            self._texture_inputs.write(inputs)
+            self._tiles.write(textures.tiles)
+        return textures
 
     def _replaced(self, old: list[moderngl.Buffer], arrays: Sequence[NDArray]) -> list[moderngl.Buffer]:
         for buffer in old:
@@ -122,12 +150,14 @@ def _normal_matrices(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], 
     return cofactors * (handedness / size)[:, None, None], handedness
 
 
-def material_records(materials: Sequence[Material]) -> NDArray:
-    """One Material record each; fields of the same name are copied."""
+def material_records(materials: Sequence[Material], input_counts: Sequence[int]) -> NDArray:
+    """One Material record each; fields of the same name are copied. input_counts: texture inputs of each."""
     dtype = record("Material")
     records = np.zeros(len(materials), dtype)
-    for name in dtype.names or ():
+    for name in sorted(set(dtype.names or ()) - {"first_input", "input_count"}):
         records[name] = [getattr(material, name) for material in materials]
+    records["input_count"] = input_counts
+    records["first_input"] = np.cumsum([0, *input_counts])[:-1]
     return records
 
 
@@ -157,26 +187,3 @@ def command_corners(scene: Scene) -> NDArray[np.float64]:
 
 def _same(old: tuple[Mesh, ...], new: tuple[Mesh, ...]) -> bool:
     return len(old) == len(new) and all(a is b for a, b in zip(old, new, strict=True))
-
-
-def _vertex_arrays(meshes: Sequence[Mesh], color_varies: bool) -> list[NDArray]:
-    if not meshes:
-        return [np.empty((0, 3), np.float32), np.empty((0, 3), np.float32), np.empty((0, 3), np.uint32)]
-    arrays = [
-        np.concatenate([m.points for m in meshes]),
-        np.concatenate([m.normals for m in meshes]),
-        np.concatenate([m.triangles for m in meshes]),
-    ]
-    if color_varies:
-        arrays.append(np.concatenate([_vertex_colors(m) for m in meshes]))
-    return arrays
-
-
-def _vertex_colors(mesh: Mesh) -> NDArray[np.float32]:
-    """(V, 4) with −1 where the placement's own value counts."""
-    colors = np.full((len(mesh.points), 4), -1.0, np.float32)
-    if mesh.display_color is not None:
-        colors[:, :3] = mesh.display_color
-    if mesh.display_opacity is not None:
-        colors[:, 3] = mesh.display_opacity
-    return colors

@@ -35,7 +35,7 @@ def _schlick(f0: Any, f90: Any, cosine: Any) -> Any:
     return f0 + (f90 - f0) * dr.power(dr.clip(1 - cosine, 0, 1), 5)
 
 
-def _taken(f0: Any, f90: Any, grazing: Any, alpha: float) -> Any:
+def _taken(f0: Any, f90: Any, grazing: Any, alpha: Any) -> Any:
     """What a lobe may take from what lies below it: measure.brdf.E_bound, in Dr.Jit's terms."""
     white = 1 - math.log(2) * alpha * alpha * grazing
     return f0 * white + (f90 - f0) * edge_bound(grazing, alpha, SMITH_GGX)

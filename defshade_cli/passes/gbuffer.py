@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import moderngl
 
 from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.planes import Plane, uses_standard_depth, write_source
 from defshade_cli.gpu.residence import DrawList
 from defshade_cli.gpu.targets import Target, allocate
-from defshade_cli.passes.planes import Plane, uses_standard_depth, write_source
+from defshade_cli.gpu.textures import textures_source
 from defshade_cli.settings import Layout
 
 
@@ -30,16 +31,21 @@ def make_gbuffer(gpu: Gpu, size: tuple[int, int], planes: tuple[Plane, ...], lay
 
 @dataclass(frozen=True, slots=True)
 class GBufferVariant:
-    """What the pass is compiled for. cutout: some opacity is below 1; color_varies: displayColor a vertex."""
+    """What the pass is compiled for.
+
+    cutout: some opacity is below 1; color_varies: displayColor a vertex; texture_groups: 0 without textures.
+    """
 
     planes: tuple[Plane, ...]
     layout: Layout
     cutout: bool
     color_varies: bool
+    texture_groups: int = 0
 
     @property
     def defines(self) -> list[str]:
         flags = ["CUTOUT"] * self.cutout + ["DISPLAY_COLOR_VARIES"] * self.color_varies
+        flags += ["TEXTURES"] * bool(self.texture_groups)
         return [plane.define for plane in self.planes] + flags
 
 
@@ -47,7 +53,10 @@ class GBufferPass:
     """Compiled for one variant."""
 
     def __init__(self, gpu: Gpu, variant: GBufferVariant) -> None:
-        generated = {"generated/planes.glsl": write_source(variant.planes, variant.layout)}
+        generated = {
+            "generated/planes.glsl": write_source(variant.planes, variant.layout),
+            "generated/textures.glsl": textures_source(variant.texture_groups),
+        }
         self._context = gpu.context
         self._program = gpu.shaders.program(
             "gbuffer.vert", "gbuffer.frag", defines=variant.defines, generated=generated
@@ -61,6 +70,7 @@ class GBufferPass:
         framebuffer.clear(depth=1.0 if standard else 0.0)
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = "<" if standard else ">"
+        draws.textures.bind(self._program)
         vertex_array = self._context.vertex_array(self._program, list(draws.vertices), draws.indices)
         vertex_array.render_indirect(draws.commands)
         vertex_array.release()

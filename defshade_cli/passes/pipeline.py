@@ -37,7 +37,9 @@ class Pipeline:
         self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant))
         self._environment_pass = cache(lambda variant: EnvironmentPass(gpu, variant))
         self._shadow_pass = cache(
-            lambda cutout, color_varies: ShadowPass(gpu, cutout=cutout, color_varies=color_varies)
+            lambda cutout, color_varies, texture_groups: ShadowPass(
+                gpu, cutout=cutout, color_varies=color_varies, texture_groups=texture_groups
+            )
         )
         self._accumulation = AccumulationPass(gpu)
 
@@ -85,7 +87,7 @@ class Pipeline:
         for batch in light_batches(scene, plan, sample):
             shadows = None
             if plan.shadows:
-                shadow_pass = self._shadow_pass(plan.cutout, draws.color_varies)
+                shadow_pass = self._shadow_pass(plan.cutout, draws.color_varies, draws.texture_groups)
                 shadows = shadow_pass.draw(draws, [lit.shadow_cameras for lit in batch], sample.texel_offset)
             lights, emitters = [lit.planned for lit in batch], [lit.emitter for lit in batch]
             self._lights.write(light_records(lights, emitters, plan.camera.position, shadows))
@@ -104,5 +106,5 @@ class Pipeline:
 
     def _draw_gbuffer(self, draws: DrawList, plan: Plan, gbuffer: GBuffer, sample: Sample) -> None:
         self._view.write(view_record(plan, gbuffer.layout, sample))
-        variant = GBufferVariant(gbuffer.planes, gbuffer.layout, plan.cutout, draws.color_varies)
+        variant = GBufferVariant(gbuffer.planes, gbuffer.layout, plan.cutout, draws.color_varies, draws.texture_groups)
         self._gbuffer_pass(variant).draw(draws, gbuffer)

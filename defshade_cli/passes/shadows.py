@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.records import record
 from defshade_cli.gpu.residence import SHADOW_MAPS, DrawList, RecordBuffer
+from defshade_cli.gpu.textures import textures_source
 from defshade_cli.passes.view import clip_from_camera
 from defshade_cli.scene.camera import Camera, Projection
 from defshade_cli.scene.emission import Emitter
@@ -134,11 +135,13 @@ class ShadowAtlas:
 class ShadowPass:
     """Draws shadow maps into an atlas of CAPACITY tiles; what one call draws the next overwrites."""
 
-    def __init__(self, gpu: Gpu, *, cutout: bool, color_varies: bool) -> None:
+    def __init__(self, gpu: Gpu, *, cutout: bool, color_varies: bool, texture_groups: int = 0) -> None:
         defines = ["CUTOUT"] * cutout + ["DISPLAY_COLOR_VARIES"] * (cutout and color_varies)
+        defines += ["TEXTURES"] * (cutout and texture_groups > 0)
+        generated = {"generated/textures.glsl": textures_source(texture_groups)}
         size = (TILES * RESOLUTION, TILES * RESOLUTION)
         self._context = gpu.context
-        self._program = gpu.shaders.program("shadow.vert", "shadow.frag", defines=defines)
+        self._program = gpu.shaders.program("shadow.vert", "shadow.frag", defines=defines, generated=generated)
         self._depth = gpu.keep(gpu.depth_texture(size))
         self._framebuffer = gpu.keep(gpu.context.framebuffer([], self._depth))
         self._maps = RecordBuffer(gpu, SHADOW_MAPS)

@@ -2,10 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
+from defshade_cli.scene.texture import TextureInput
+
 Color = tuple[float, float, float]
+
+UV_SETS = 2
+"""Sets of texture coordinates that one material can read."""
+
+TEXTURED_FIELDS = (
+    "diffuse_color",
+    "emissive_color",
+    "specular_color",
+    "metallic",
+    "roughness",
+    "clearcoat",
+    "clearcoat_roughness",
+    "opacity",
+    "ior",
+    "normal",
+)
+"""What a texture may feed: fields of Material, and the normal in tangent space, which has no constant."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,6 +34,7 @@ class Material:
 
     uses_display_color: diffuse_color and opacity come from the drawable's displayColor and displayOpacity:
         the material of a prim that has none bound, or a displayColor reader.
+    inputs: the textures, by the name of the field in TEXTURED_FIELDS that they replace.
     """
 
     path: str
@@ -30,6 +51,12 @@ class Material:
     opacity_mode: Literal["transparent", "presence"] = "transparent"
     ior: float = 1.5
     uses_display_color: bool = False
+    inputs: Mapping[str, TextureInput] = field(default_factory=dict, hash=False)
+
+    @property
+    def uv_names(self) -> tuple[str, ...]:
+        """The primvars that its textures read, each once."""
+        return tuple(dict.fromkeys(i.uv for i in self.inputs.values() if i.uv))
 
 
 UNBOUND = Material("<unbound>", uses_display_color=True)

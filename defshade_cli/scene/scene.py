@@ -12,6 +12,7 @@ from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.geometry import Drawable, Mesh, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import Material
+from defshade_cli.scene.texture import Texture
 from defshade_cli.spaces import ConformPolicy
 
 
@@ -58,6 +59,11 @@ class Scene:
         """(D, 2, 3) world-space box around all placements of each drawable; (+inf, −inf) around none."""
         boxes = [world_boxes(self.meshes[d.mesh].bounds, d.world_from_object) for d in self.drawables]
         return np.array([enclose([box]) for box in boxes]).reshape(-1, 2, 3)
+
+    @cached_property
+    def textures(self) -> tuple[Texture, ...]:
+        """All that the materials read, each once."""
+        return tuple(dict.fromkeys(i.texture for material in self.materials for i in material.inputs.values()))
 
     @cached_property
     def triangle_count(self) -> int:

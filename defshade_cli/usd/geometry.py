@@ -19,9 +19,11 @@ from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd import flatness
 from defshade_cli.usd.control import CONTROL_ATTRIBUTES, Control, read_control
 from defshade_cli.usd.copies import Copies
+from defshade_cli.usd.curves import CURVES_ATTRIBUTES, read_curves
 from defshade_cli.usd.gprims import read_solid, size_attributes
 from defshade_cli.usd.mesh import MESH_ATTRIBUTES, read_mesh
 from defshade_cli.usd.normals import with_normals
+from defshade_cli.usd.nurbs import PATCH_ATTRIBUTES, read_patch
 from defshade_cli.usd.points import POINTS_ATTRIBUTES, read_points
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.primvars import find_display, find_uvs
@@ -137,6 +139,10 @@ def _read_shape(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> tuple[
         return read_mesh(UsdGeom.Mesh(prim), time, issues), None
     if prim.IsA(UsdGeom.Points):
         return read_points(UsdGeom.Points(prim), time, issues)
+    if prim.IsA(UsdGeom.BasisCurves):
+        return read_curves(UsdGeom.BasisCurves(prim), time, issues), None
+    if prim.IsA(UsdGeom.NurbsPatch):
+        return read_patch(UsdGeom.NurbsPatch(prim), time, issues), None
     return read_solid(prim, time, issues), None
 
 
@@ -146,6 +152,10 @@ def _attributes(prim: Usd.Prim) -> tuple[str, ...]:
         return MESH_ATTRIBUTES + CONTROL_ATTRIBUTES
     if prim.IsA(UsdGeom.Points):
         return POINTS_ATTRIBUTES
+    if prim.IsA(UsdGeom.BasisCurves):
+        return CURVES_ATTRIBUTES
+    if prim.IsA(UsdGeom.NurbsPatch):
+        return PATCH_ATTRIBUTES
     return size_attributes(prim)
 
 

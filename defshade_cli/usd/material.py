@@ -1,8 +1,9 @@
 """UsdShade materials as scene.Material.
 
-Read are UsdPreviewSurface nodes with constant inputs, also through the interfaces of materials and node graphs, and
-readers of displayColor. Any other source of an input is named in the report: the input then takes the fallback that
-is authored on the node in its place, or the schema's default.
+Read are UsdPreviewSurface nodes whose inputs are constant or come from a UsdUVTexture, also through the interfaces of
+materials and node graphs, and readers of displayColor. Any other source of an input is named in the report, and so is
+a texture without its file: the input then takes the fallback that is authored on the node in its place, or the
+schema's default.
 """
 
 from __future__ import annotations
@@ -13,8 +14,11 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Usd, UsdShade
 
-from defshade_cli.scene.material import UNBOUND, Material
+from defshade_cli.scene.material import TEXTURED_FIELDS, UNBOUND, UV_SETS, Material
 from defshade_cli.scene.scene import Unsupported
+from defshade_cli.scene.texture import TextureInput
+from defshade_cli.usd.network import Network, computed, node_of
+from defshade_cli.usd.texture import Unreadable, read_texture_input
 
 _FIELDS = {
     "diffuseColor": "diffuse_color",
@@ -29,8 +33,12 @@ _FIELDS = {
     "opacityThreshold": "opacity_threshold",
     "opacityMode": "opacity_mode",
     "ior": "ior",
+    "normal": "normal",
 }
-"""UsdPreviewSurface inputs and the fields they fill. normal, displacement and occlusion have none."""
+"""UsdPreviewSurface inputs and the fields they fill; a normal only from a texture."""
+
+_WITHOUT_EFFECT = ("occlusion",)
+"""Inputs that direct light does not see: occlusion dims what comes from all around."""
 
 _DEFAULTS = {f.name: f.default for f in fields(Material)}
 _CHANNELS = {"r": slice(0, 1), "g": slice(1, 2), "b": slice(2, 3), "a": slice(3, 4)}
@@ -51,25 +59,28 @@ class ReadMaterial:
 class _Inputs:
     """What reading a node's inputs gathers."""
 
+    network: Network
     values: dict[str, Any] = field(default_factory=dict)
+    textures: dict[str, TextureInput] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
-    time_varying: bool = False
 
 
 def read_material(stage: Usd.Stage, path: Sdf.Path, shown_as: str, time: Usd.TimeCode) -> ReadMaterial:
     """The material at `path`, reported as `shown_as`; one that is not understood is drawn like an unbound one."""
-    material = UsdShade.Material(stage.GetPrimAtPath(path))
-    if not material:
+    prim = UsdShade.Material(stage.GetPrimAtPath(path))
+    if not prim:
         return _not_understood(shown_as, "the bound material does not exist")
-    shader, _, _ = material.ComputeSurfaceSource()
+    shader, _, _ = prim.ComputeSurfaceSource()
     identifier = shader.GetShaderId() if shader else None
     if identifier != "UsdPreviewSurface":
-        return _not_understood(shown_as, _surface_named(material, shader, identifier))
-    inputs = _read_inputs(shader, time)
+        return _not_understood(shown_as, _surface_named(prim, shader, identifier))
+    inputs = _read_inputs(shader, Network(time))
+    material = Material(shown_as, **inputs.values, inputs=inputs.textures)
+    inputs.left_out.extend(f"textures at primvar {name}" for name in material.uv_names[UV_SETS:])
     reason = f"not read: {', '.join(inputs.left_out)}"
     return ReadMaterial(
-        Material(shown_as, **inputs.values),
-        time_varying=inputs.time_varying,
+        material,
+        time_varying=inputs.network.time_varying,
         issues=(Unsupported(shown_as, reason),) if inputs.left_out else (),
     )
 
@@ -86,23 +97,22 @@ def _surface_named(material: UsdShade.Material, shader: UsdShade.Shader, identif
     return f"no UsdPreviewSurface, only {', '.join(contexts)}" if contexts else "no surface"
 
 
-def _read_inputs(shader: UsdShade.Shader, time: Usd.TimeCode) -> _Inputs:
-    inputs = _Inputs()
+def _read_inputs(shader: UsdShade.Shader, network: Network) -> _Inputs:
+    inputs = _Inputs(network)
     for authored in shader.GetInputs():
         name = authored.GetBaseName()
-        sources = authored.GetValueProducingAttributes()
-        if not sources:
+        source = network.source(shader, name)
+        if source is None or name in _WITHOUT_EFFECT:
             continue
-        if sources[0].GetName().startswith(UsdShade.Tokens.inputs):
-            _take(inputs, name, sources[0].Get(time))
-            inputs.time_varying |= sources[0].ValueMightBeTimeVarying()
+        if computed(source):
+            _take_from_node(inputs, name, source)
         else:
-            _take_from_node(inputs, name, sources[0], time)
+            _take(inputs, name, network.of(source))
     return inputs
 
 
 def _take(inputs: _Inputs, name: str, value: Any) -> None:
-    if name not in _FIELDS or value is None:
+    if _FIELDS.get(name) not in _DEFAULTS or value is None:
         return
     try:
         inputs.values[_FIELDS[name]] = _as_field(value, _DEFAULTS[_FIELDS[name]])
@@ -110,28 +120,27 @@ def _take(inputs: _Inputs, name: str, value: Any) -> None:
         inputs.left_out.append(f"{name} ({type(value).__name__})")
 
 
-def _take_from_node(inputs: _Inputs, name: str, output: Usd.Attribute, time: Usd.TimeCode) -> None:
-    """A value that a shader computes: displayColor is understood, of all others the authored fallback is taken."""
-    node = UsdShade.Shader(output.GetPrim())
-    identifier = str(node.GetShaderId() or "a node without id")
-    varname = _constant(node, "varname", time) if identifier.startswith(_READER) else None
+def _take_from_node(inputs: _Inputs, name: str, output: Usd.Attribute) -> None:
+    """A value that a node computes: a texture or displayColor; of all others the authored fallback is taken."""
+    node, identifier = node_of(output)
+    varname = inputs.network.value(node, "varname") if identifier.startswith(_READER) else None
     if name == "diffuseColor" and varname == "displayColor":
         inputs.values["uses_display_color"] = True
         return
-    _take(inputs, name, _fallback(node, output.GetBaseName(), time))
-    if not (name == "opacity" and varname == "displayOpacity"):
+    _take(inputs, name, _fallback(inputs.network, node, output.GetBaseName()))
+    if identifier == "UsdUVTexture" and _FIELDS.get(name) in TEXTURED_FIELDS:
+        try:
+            inputs.textures[_FIELDS[name]] = read_texture_input(inputs.network, output)
+        except Unreadable as reason:
+            inputs.left_out.append(f"{name} ({reason})")
+    elif not (name == "opacity" and varname == "displayOpacity"):
         inputs.left_out.append(f"{name} (primvar {varname})" if varname else f"{name} ({identifier})")
 
 
-def _fallback(node: UsdShade.Shader, channel: str, time: Usd.TimeCode) -> Any:
+def _fallback(network: Network, node: UsdShade.Shader, channel: str) -> Any:
     """The fallback authored on a texture or primvar reader, as the channel that is connected; else None."""
-    value = _constant(node, "fallback", time)
+    value = network.value(node, "fallback")
     return value if value is None or channel not in _CHANNELS else np.asarray(value)[_CHANNELS[channel]]
-
-
-def _constant(node: UsdShade.Shader, name: str, time: Usd.TimeCode) -> Any:
-    sources = node.GetInput(name).GetValueProducingAttributes() if node.GetInput(name) else ()
-    return sources[0].Get(time) if sources else None
 
 
 def _as_field(value: Any, default: Any) -> Any:

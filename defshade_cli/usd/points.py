@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
 from defshade_cli.usd.copies import Copies
 from defshade_cli.usd.gprims import sphere
-from defshade_cli.usd.polygons import Polygons
-from defshade_cli.usd.primvars import Authored, authored, count_elements, fit, read_display
+from defshade_cli.usd.polygons import Polygons, Primvar
+from defshade_cli.usd.primvars import Authored, Elements, authored, count_elements, fit, read_display
 from defshade_cli.usd.values import floats
 
 POINTS_ATTRIBUTES = ("points", "widths", "ids")
@@ -36,14 +38,20 @@ def read_points(points: UsdGeom.Points, time: Usd.TimeCode, issues: list[str]) -
     return sphere(0.5, _segments(len(copies.ids))), copies
 
 
-def read_widths(prim: Usd.Prim, time: Usd.TimeCode) -> Authored | None:
-    """primvars:widths, else widths; None where neither is authored."""
+def read_widths(prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> Primvar:
+    """primvars:widths, else widths. A single value serves all, whatever its interpolation; 1 where none fits."""
     primvar = authored(UsdGeom.PrimvarsAPI(prim).GetPrimvar("widths"), time)
     attribute = prim.GetAttribute("widths")
-    if primvar is not None or not attribute.HasAuthoredValue():
-        return primvar
     interpolation = attribute.GetMetadata("interpolation") or UsdGeom.Tokens.vertex
-    return Authored("widths", attribute.Get(time), interpolation)
+    source = primvar or Authored("widths", attribute.Get(time), interpolation)
+    value = None if source.value is None else floats(source.value, 1)
+    if value is not None and len(value) == 1:
+        return Primvar(np.abs(value), "constant")
+    widths = fit(source, 1, elements, issues)
+    if widths is not None:
+        return replace(widths, values=np.abs(widths.values))
+    issues.append(f"no widths that fit: {FALLBACK_WIDTH:g} is taken")
+    return Primvar(np.full(1, FALLBACK_WIDTH, np.float32), "constant")
 
 
 def _copies(points: UsdGeom.Points, positions: NDArray[np.float32], time: Usd.TimeCode, issues: list[str]) -> Copies:
@@ -51,7 +59,7 @@ def _copies(points: UsdGeom.Points, positions: NDArray[np.float32], time: Usd.Ti
     elements = count_elements(1, count, count)
     color = read_display(prim, "displayColor", 3, time, elements, issues)
     opacity = read_display(prim, "displayOpacity", 1, time, elements, issues)
-    widths = _widths(prim, count, time, issues)
+    widths = np.broadcast_to(read_widths(prim, time, elements, issues).values, (count,))
     drawn = np.isfinite(positions).all(axis=1) & np.isfinite(widths)
     if not drawn.all():
         issues.append(f"{np.count_nonzero(~drawn)} points are left out: they are not finite")
@@ -61,19 +69,6 @@ def _copies(points: UsdGeom.Points, positions: NDArray[np.float32], time: Usd.Ti
         np.broadcast_to(np.float32(np.nan) if color is None else color.values, (count, 3))[drawn],
         np.broadcast_to(np.float32(np.nan) if opacity is None else opacity.values, (count,))[drawn],
     )
-
-
-def _widths(prim: Usd.Prim, count: int, time: Usd.TimeCode, issues: list[str]) -> NDArray[np.float32]:
-    """(count,) one a point. A single value serves all, whatever its interpolation."""
-    source = read_widths(prim, time)
-    value = None if source is None or source.value is None else floats(source.value, 1)
-    if value is not None and len(value) == 1:
-        return np.repeat(np.abs(value), count)
-    widths = fit(source, 1, count_elements(1, count, count), issues)
-    if widths is None:
-        issues.append(f"no widths that fit: {FALLBACK_WIDTH:g} is taken")
-        return np.full(count, FALLBACK_WIDTH, np.float32)
-    return np.abs(np.broadcast_to(widths.values, (count,)))
 
 
 def _placed(positions: NDArray[np.float32], widths: NDArray[np.float32]) -> NDArray[np.float64]:

@@ -31,6 +31,28 @@ struct Material {
     float opacity_threshold;
     uint use_specular_workflow;
     uint uses_display_color;
+    uint first_input;          // of its textures
+    uint input_count;
+};
+
+struct TextureInput {
+    vec4 scale;
+    vec4 bias;
+    vec4 texture_from_uv;      // columns of the linear part
+    vec2 texture_offset;
+    uint uv_set;               // 0 or 1
+    uint channel;              // 0 to 3, or 4 for all
+    uint field;                // of the material, numbered by generated/textures.glsl
+    uint wrap_s;
+    uint wrap_t;
+    uint first_tile;
+    uint tile_count;           // UDIM: columns of 10, row by row
+};
+
+struct Tile {
+    vec2 size;                 // texels
+    uint group;                // which texture array
+    uint layer;
 };
 
 struct Light {

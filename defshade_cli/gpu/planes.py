@@ -93,7 +93,7 @@ PLANES: tuple[Plane, ...] = (
         "emission",
         4,
         _encodings("vec4(s.emission, 0.0)", "s.emission = t.rgb;", narrow="f2"),
-        lambda material: any(material.emissive_color),
+        lambda material: any(material.emissive_color) or "emissive_color" in material.inputs,
     ),
     Plane(
         "specular",
@@ -103,7 +103,7 @@ PLANES: tuple[Plane, ...] = (
             "s.f0 = t.rgb;",  # F90 needs no plane: the specular workflow has metallic 0, for which it is white
             narrow="f2",
         ),
-        lambda material: material.use_specular_workflow or material.ior != 1.5,
+        lambda material: material.use_specular_workflow or material.ior != 1.5 or "ior" in material.inputs,
     ),
     Plane(
         "clearcoat",
@@ -112,7 +112,7 @@ PLANES: tuple[Plane, ...] = (
             "vec4(s.clearcoat, s.clearcoat_roughness, 0.0, 0.0)",
             "s.clearcoat = t.x; s.clearcoat_roughness = t.y;",
         ),
-        lambda material: material.clearcoat > 0.0,
+        lambda material: material.clearcoat > 0.0 or "clearcoat" in material.inputs,
     ),
 )
 

@@ -1,0 +1,63 @@
+"""Vertex arrays of all meshes, one after another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.scene.geometry import Drawable, Mesh
+from defshade_cli.scene.material import UV_SETS, Material
+
+UvNames = tuple[str, ...]
+
+
+def uv_names(drawables: Sequence[Drawable], materials: Sequence[Material], count: int) -> tuple[UvNames, ...]:
+    """For each of `count` meshes the primvars that fill its sets, as the first of its materials wants them."""
+    names: list[UvNames] = [()] * count
+    for drawable in drawables:
+        for subset in drawable.subsets:
+            wanted = materials[subset.material].uv_names[:UV_SETS]
+            names[drawable.mesh] += wanted[len(names[drawable.mesh]) :]
+    return tuple(names)
+
+
+def vertex_arrays(
+    meshes: Sequence[Mesh], uvs: Sequence[UvNames], *, color_varies: bool, textured: bool
+) -> list[NDArray]:
+    """Positions, normals and indices; colours a vertex and texture coordinates where they are asked for."""
+    arrays = [
+        _joined([m.points for m in meshes], 3),
+        _joined([m.normals for m in meshes], 3),
+        _joined([m.triangles for m in meshes], 3, np.uint32),
+    ]
+    if color_varies:
+        arrays.append(_joined([_vertex_colors(m) for m in meshes], 4))
+    if textured:
+        arrays.append(_joined([_vertex_uvs(m, names) for m, names in zip(meshes, uvs, strict=True)], 2 * UV_SETS))
+    return arrays
+
+
+def _joined(arrays: Sequence[NDArray], width: int, dtype: type = np.float32) -> NDArray:
+    """One below the other; a scene may have none."""
+    return np.concatenate([np.empty((0, width), dtype), *arrays])
+
+
+def _vertex_colors(mesh: Mesh) -> NDArray[np.float32]:
+    """(V, 4) with −1 where the placement's own value counts."""
+    colors = np.full((len(mesh.points), 4), -1.0, np.float32)
+    if mesh.display_color is not None:
+        colors[:, :3] = mesh.display_color
+    if mesh.display_opacity is not None:
+        colors[:, 3] = mesh.display_opacity
+    return colors
+
+
+def _vertex_uvs(mesh: Mesh, names: UvNames) -> NDArray[np.float32]:
+    """(V, 4), a set in each half; 0, a primvar reader's fallback, for what the mesh lacks."""
+    uvs = np.zeros((len(mesh.points), 2 * UV_SETS), np.float32)
+    for number, name in enumerate(names):
+        if name in mesh.uvs:
+            uvs[:, 2 * number : 2 * number + 2] = mesh.uvs[name]
+    return uvs

@@ -1,0 +1,54 @@
+"""Image textures and how a material's inputs read them, in the terms of UsdUVTexture and UsdTransform2d."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+ColorSpace = Literal["auto", "sRGB", "raw"]
+Wrap = Literal["black", "clamp", "repeat", "mirror", "useMetadata"]
+Channel = Literal["r", "g", "b", "a", "rgb"]
+Four = tuple[float, float, float, float]
+Affine = tuple[tuple[float, float, float], tuple[float, float, float]]
+
+IDENTITY: Affine = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+FIRST_UDIM = 1001
+
+
+@dataclass(frozen=True, slots=True)
+class ImageFile:
+    """path: where it lies; of one inside a package, `package.usdz[wood.png]`, contents are its bytes."""
+
+    path: str
+    contents: bytes | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Texture:
+    """An image, or the tiles of a UDIM set.
+
+    tiles: (number, file) each; UDIM numbers are 1001 + column + 10 · row, and a single image is 1001.
+    wrap_s, wrap_t: outside [0, 1]; a UDIM set has none.
+    """
+
+    tiles: tuple[tuple[int, ImageFile], ...]
+    udim: bool = False
+    color_space: ColorSpace = "auto"
+    wrap_s: Wrap = "useMetadata"
+    wrap_t: Wrap = "useMetadata"
+
+
+@dataclass(frozen=True, slots=True)
+class TextureInput:
+    """What feeds one input of a material: channel of (texel · scale + bias) at texture_from_uv · (u, v, 1).
+
+    uv: primvar that holds the texture coordinates; empty for none, the affine's offset alone then counts.
+    A UDIM tile that is missing is black with alpha 0; where no file can be read, the material's own value stands.
+    """
+
+    texture: Texture
+    channel: Channel = "rgb"
+    scale: Four = (1.0, 1.0, 1.0, 1.0)
+    bias: Four = (0.0, 0.0, 0.0, 0.0)
+    uv: str = "st"
+    texture_from_uv: Affine = IDENTITY

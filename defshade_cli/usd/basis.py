@@ -1,0 +1,161 @@
+"""The bases of cubic curves, and their samples as sparse weights over the control points.
+
+Segments, wraps and counts: the UsdGeomBasisCurves schema text. A pinned curve has a phantom point before its first and
+after its last, 2 P₀ − P₁ and 2 Pₙ₋₁ − Pₙ₋₂.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from defshade_cli.usd.polygons import Primvar
+
+Weights: TypeAlias = sparse.csr_array
+
+LARGEST_DETAIL = 8
+
+_BASES: dict[str, tuple[int, NDArray[np.float64]]] = {
+    "linear": (1, np.array([[1, -1], [0, 1]], np.float64)),
+    "bezier": (3, np.array([[1, -3, 3, -1], [0, 3, -6, 3], [0, 0, 3, -3], [0, 0, 0, 1]], np.float64)),
+    "bspline": (1, np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6.0),
+    "catmullRom": (1, np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]) / 2.0),
+}
+"""vstep, and of each control point of a segment the coefficients of 1, t, t², t³."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """basis: or `linear`.  wrap: as authored."""
+
+    basis: str
+    wrap: str
+
+    @property
+    def closed(self) -> bool:
+        return self.wrap == "periodic"
+
+    @property
+    def pinned(self) -> bool:
+        return self.wrap == "pinned" and self.basis in ("bspline", "catmullRom")
+
+    def segments(self, counts: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(K,) segments of curves with so many points, 0 for one that has too few."""
+        step, basis = _BASES[self.basis]
+        extended = counts + 2 * self.pinned
+        found = counts // step if self.closed else (extended - len(basis)) // step + 1
+        open_fits, closed_fits = (counts >= 2) & (extended >= len(basis)), (counts >= 3) & (counts % step == 0)
+        fits = closed_fits if self.closed else open_fits
+        return np.where(fits, np.maximum(found, 0), 0)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class CurveSamples:
+    """S samples along curves.
+
+    curve: (S,) the authored curve of each, ascending.  closed: whether a curve's last sample is followed by its first.
+    vertex, varying: (S, points) and (S, varying values) weights.
+    elements: how many values each interpolation needs.  left_out: curves that have too few points.
+    """
+
+    curve: NDArray[np.intp]
+    closed: bool
+    vertex: Weights
+    varying: Weights
+    elements: dict[str, int]
+    left_out: int
+
+    @property
+    def count(self) -> int:
+        return len(self.curve)
+
+    def at(self, primvar: Primvar) -> NDArray[np.float64]:
+        """(S, ...) the values of a primvar at the samples."""
+        values = primvar.values.astype(np.float64)
+        match primvar.interpolation:
+            case "constant":
+                return np.broadcast_to(values, (self.count, *values.shape[1:]))
+            case "uniform":
+                return values[self.curve]
+            case "vertex":
+                return self.vertex @ values
+            case _:
+                return self.varying @ values
+
+
+def sample_curves(kind: Kind, counts: NDArray[np.int64], points: int, detail: int) -> CurveSamples:
+    """Samples of curves of so many points each, `detail` a segment; a linear one needs one."""
+    detail = 1 if kind.basis == "linear" else detail
+    segments = kind.segments(counts)
+    rows = segments * detail + np.where(segments > 0, not kind.closed, 0)
+    curve = np.repeat(np.arange(len(counts)), rows)
+    place = np.arange(len(curve)) - np.repeat(np.cumsum(rows) - rows, rows)
+    segment = np.minimum(place // detail, segments[curve] - 1)
+    t = (place - segment * detail) / detail
+    varying_counts = segments + (0 if kind.closed else 1)
+    elements = {"constant": 1, "uniform": len(counts), "vertex": points}
+    varying = int(varying_counts.sum())
+    return CurveSamples(
+        curve,
+        kind.closed,
+        _vertex_weights(kind, counts, points, curve, segment, t),
+        _varying_weights(kind, varying_counts, curve, segment, t),
+        elements | {"varying": varying, "faceVarying": varying},
+        int(np.count_nonzero(segments == 0)),
+    )
+
+
+def _vertex_weights(
+    kind: Kind,
+    counts: NDArray[np.int64],
+    points: int,
+    curve: NDArray[np.intp],
+    segment: NDArray[np.int64],
+    t: NDArray[np.float64],
+) -> Weights:
+    """(S, points)"""
+    step, basis = _BASES[kind.basis]
+    size = len(basis)
+    weights = (t[:, None] ** np.arange(size)) @ basis.T
+    own = segment[:, None] * step + np.arange(size) - kind.pinned
+    if kind.closed:
+        own %= counts[curve, None]
+    first = np.cumsum(counts) - counts
+    column = first[curve, None] + own
+    phantom = points + 2 * curve[:, None]
+    column = np.where(own < 0, phantom, np.where(own >= counts[curve, None], phantom + 1, column))
+    row = np.repeat(np.arange(len(curve)), size)
+    extended = sparse.csr_array((weights.ravel(), (row, column.ravel())), shape=(len(curve), points + 2 * len(counts)))
+    return extended @ _with_phantoms(first, counts, points)
+
+
+def _with_phantoms(first: NDArray[np.int64], counts: NDArray[np.int64], points: int) -> Weights:
+    """(points + 2 curves, points) every point, then the two phantoms of each curve of two points and more."""
+    curve = np.flatnonzero(counts >= 2)
+    start, end = first[curve], (first + counts - 1)[curve]
+    before, after = points + 2 * curve, points + 2 * curve + 1
+    row = np.concatenate([np.arange(points), before, before, after, after])
+    column = np.concatenate([np.arange(points), start, start + 1, end, end - 1])
+    ones = np.ones(len(curve))
+    weight = np.concatenate([np.ones(points), 2 * ones, -ones, 2 * ones, -ones])
+    return sparse.csr_array((weight, (row, column)), shape=(points + 2 * len(counts), points))
+
+
+def _varying_weights(
+    kind: Kind,
+    varying_counts: NDArray[np.int64],
+    curve: NDArray[np.intp],
+    segment: NDArray[np.int64],
+    t: NDArray[np.float64],
+) -> Weights:
+    """(S, varying values) linear from one end of a segment to the other."""
+    first = (np.cumsum(varying_counts) - varying_counts)[curve]
+    following = (segment + 1) % varying_counts[curve] if kind.closed else segment + 1
+    row = np.tile(np.arange(len(curve)), 2)
+    column = np.concatenate([first + segment, first + following])
+    weight = np.concatenate([1.0 - t, t])
+    return sparse.csr_array((weight, (row, column)), shape=(len(curve), int(varying_counts.sum())))

@@ -1,0 +1,110 @@
+"""BasisCurves → Polygons: tubes, or ribbons where normals are authored.
+
+Every sample of every curve is a weighted sum of control points: one sparse matrix takes points, and whatever lies on
+them, to samples.
+
+    segments of control points ── basis ── samples along the curves ── frames ── tubes | ribbons
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+from defshade_cli.usd.basis import LARGEST_DETAIL, CurveSamples, Kind, sample_curves
+from defshade_cli.usd.points import read_widths
+from defshade_cli.usd.polygons import Polygons, Primvar
+from defshade_cli.usd.primvars import Authored, authored, fit, read_display, read_uvs
+from defshade_cli.usd.tubes import ribbons, tubes
+from defshade_cli.usd.values import floats, integers
+
+CURVES_ATTRIBUTES = ("points", "curveVertexCounts", "widths", "normals")
+"""What is read of BasisCurves that may vary over time, besides primvars."""
+
+QUAD_BUDGET = 1_000_000
+"""Quads of one prim up to which its tubes are round, and its segments many; more get the next lower detail."""
+
+_DETAILS = ((LARGEST_DETAIL, 12), (4, 6), (2, 3))
+"""Samples a segment of cubic curves, and sides of tubes."""
+
+
+def read_curves(curves: UsdGeom.BasisCurves, time: Usd.TimeCode, issues: list[str]) -> Polygons:
+    """All curves of the prim, each a face in the sense of `Polygons.faces`. Bad data becomes issues."""
+    value = curves.GetPointsAttr().Get(time)
+    points = None if value is None else floats(value, 3)
+    counts = integers(curves.GetCurveVertexCountsAttr().Get(time) or [])
+    points = np.empty((0, 3), np.float32) if points is None else points
+    counts = _complete(np.empty(0, np.int32) if counts is None else counts, len(points), issues)
+    if not np.isfinite(points).all():
+        issues.append("it is left out: not all of its points are finite")
+        counts = counts[:0]
+    kind = _kind(curves)
+    samples, sides = _detailed(kind, counts, len(points))
+    if samples.left_out:
+        issues.append(f"{samples.left_out} curves are left out: they have too few points, or cannot be closed")
+    return _build(curves, samples, points, sides, time, issues)
+
+
+def _complete(counts: NDArray[np.integer], available: int, issues: list[str]) -> NDArray[np.int64]:
+    """The curves whose points are all there."""
+    wanted = np.maximum(counts, 0).astype(np.int64)
+    complete = int(np.searchsorted(np.cumsum(wanted), available, "right"))
+    if not len(counts):
+        issues.append("it has no curves")
+    elif complete < len(counts):
+        issues.append(f"{len(counts) - complete} curves are left out: points ends before them")
+    return wanted[:complete]
+
+
+def _kind(curves: UsdGeom.BasisCurves) -> Kind:
+    basis = "linear" if curves.GetTypeAttr().Get() == UsdGeom.Tokens.linear else curves.GetBasisAttr().Get()
+    return Kind(str(basis), str(curves.GetWrapAttr().Get()))
+
+
+def _detailed(kind: Kind, counts: NDArray[np.int64], points: int) -> tuple[CurveSamples, int]:
+    """The finest samples within the budget, and sides."""
+    for detail, sides in _DETAILS:
+        samples = sample_curves(kind, counts, points, detail)
+        if samples.count * sides <= QUAD_BUDGET:
+            break
+    return samples, sides
+
+
+def _build(
+    curves: UsdGeom.BasisCurves,
+    samples: CurveSamples,
+    points: NDArray[np.float32],
+    sides: int,
+    time: Usd.TimeCode,
+    issues: list[str],
+) -> Polygons:
+    prim = curves.GetPrim()
+
+    centres = samples.vertex @ points.astype(np.float64)
+    radii = samples.at(read_widths(prim, time, samples.elements, issues)) / 2.0
+    authored_normals = fit(_normals(curves, time), 3, samples.elements, issues)
+    normals = None if authored_normals is None else samples.at(authored_normals)
+    shape = tubes(samples, centres, radii, sides) if normals is None else ribbons(samples, centres, radii, normals)
+    shape = replace(
+        shape,
+        display_color=read_display(prim, "displayColor", 3, time, samples.elements, issues),
+        display_opacity=read_display(prim, "displayOpacity", 1, time, samples.elements, issues),
+        uvs=read_uvs(prim, time, samples.elements, issues),
+    )
+    around = len(shape.points) // max(samples.count, 1)
+    return shape.with_primvars(lambda p: p if p is shape.normals else _around(p, samples, around))
+
+
+def _normals(curves: UsdGeom.BasisCurves, time: Usd.TimeCode) -> Authored | None:
+    primvar = authored(UsdGeom.PrimvarsAPI(curves).GetPrimvar("normals"), time)
+    return primvar or Authored("normals", curves.GetNormalsAttr().Get(time), curves.GetNormalsInterpolation())
+
+
+def _around(primvar: Primvar, samples: CurveSamples, around: int) -> Primvar:
+    """A primvar of the curves on the points of their polygons, `around` of them a sample."""
+    if primvar.interpolation == "constant":
+        return primvar
+    return Primvar(np.repeat(samples.at(primvar), around, axis=0).astype(np.float32), "vertex")

@@ -1,0 +1,43 @@
+"""The values that reach the inputs of shader nodes, through the interfaces of materials and node graphs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pxr import Usd, UsdShade
+
+
+class Network:
+    """Reads shader nodes at one time. time_varying: some value that was read differs over time."""
+
+    def __init__(self, time: Usd.TimeCode) -> None:
+        self.time = time
+        self.time_varying = False
+
+    def value(self, node: UsdShade.Shader, name: str, default: Any = None) -> Any:
+        """The value of an input; `default` where none is authored or a node computes it."""
+        attribute = self.source(node, name)
+        value = None if attribute is None or computed(attribute) else self.of(attribute)
+        return default if value is None else value
+
+    def of(self, attribute: Usd.Attribute) -> Any:
+        """The value of an attribute that holds one."""
+        self.time_varying |= attribute.ValueMightBeTimeVarying()
+        return attribute.Get(self.time)
+
+    def source(self, node: UsdShade.Shader, name: str) -> Usd.Attribute | None:
+        """The attribute that an input's value comes from: an input somewhere, or the output of another node."""
+        found = node.GetInput(name)
+        sources = found.GetValueProducingAttributes() if found else ()
+        return sources[0] if sources else None
+
+
+def computed(attribute: Usd.Attribute) -> bool:
+    """Is it the output of a node?"""
+    return bool(UsdShade.Output.IsOutput(attribute))
+
+
+def node_of(output: Usd.Attribute) -> tuple[UsdShade.Shader, str]:
+    """The node that computes an output, and what kind of node it is."""
+    node = UsdShade.Shader(output.GetPrim())
+    return node, str(node.GetShaderId() or "a node without id")

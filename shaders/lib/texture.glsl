@@ -1,0 +1,98 @@
+#include "lib/records.glsl"
+
+layout(std430, binding = 5) readonly buffer TextureInputBlock { TextureInput texture_inputs[]; };
+layout(std430, binding = 6) readonly buffer TileBlock { Tile tiles[]; };
+
+const uint WRAP_BLACK = 0u;
+const uint WRAP_CLAMP = 1u;
+const uint WRAP_REPEAT = 2u;
+const uint WRAP_MIRROR = 3u;
+const uint WRAP_UDIM = 4u;
+const uint NO_GROUP = 0xffffffffu;
+const uint ALL_CHANNELS = 4u;
+
+// Texture coordinates and how they change from pixel to pixel: taken before any branch, where derivatives are defined.
+struct Coordinates {
+    vec2 at, dx, dy;
+};
+
+#include "generated/textures.glsl"
+
+Coordinates of_texture(TextureInput t, vec4 uv, vec4 uv_dx, vec4 uv_dy) {
+    mat2 linear = mat2(t.texture_from_uv);
+    bool second = t.uv_set != 0u;
+    return Coordinates(linear * (second ? uv.zw : uv.xy) + t.texture_offset,
+                       linear * (second ? uv_dx.zw : uv_dx.xy),
+                       linear * (second ? uv_dy.zw : uv_dy.xy));
+}
+
+// The arrays repeat; the other modes keep half a texel, of the mip level that is read, from the edge.
+float wrapped(float s, uint mode, float half_texel) {
+    if (mode == WRAP_REPEAT) return s;
+    if (mode == WRAP_MIRROR) s = 1.0 - abs(mod(s, 2.0) - 1.0);
+    return clamp(s, half_texel, 1.0 - half_texel);
+}
+
+bool is_outside(float s, uint mode) {
+    return mode == WRAP_BLACK && (s < 0.0 || s > 1.0);
+}
+
+vec4 read_tile(Tile tile, TextureInput t, Coordinates c) {
+    if (is_outside(c.at.x, t.wrap_s) || is_outside(c.at.y, t.wrap_t)) return vec4(0.0);
+    float footprint = max(length(c.dx * tile.size), length(c.dy * tile.size)); // texels
+    vec2 half_texel = min(0.5 * exp2(ceil(log2(max(footprint, 1.0)))) / tile.size, vec2(0.5));
+    vec2 st = vec2(wrapped(c.at.x, t.wrap_s, half_texel.x), wrapped(c.at.y, t.wrap_t, half_texel.y));
+    return read_group(tile.group, vec3(st, float(tile.layer)), c.dx, c.dy);
+}
+
+// UDIM 1001 + column + 10 row; NO_GROUP where the set has no such tile.
+Tile find_tile(TextureInput t, inout Coordinates c) {
+    if (t.wrap_s != WRAP_UDIM) return tiles[t.first_tile];
+    vec2 cell = floor(c.at);
+    c.at -= cell;
+    float index = cell.x + 10.0 * cell.y;
+    if (cell.x < 0.0 || cell.x > 9.0 || cell.y < 0.0 || index >= float(t.tile_count)) return Tile(vec2(1.0), NO_GROUP, 0u);
+    return tiles[t.first_tile + uint(index)];
+}
+
+// UsdUVTexture's output at some coordinates.
+vec4 read_texture(TextureInput t, Coordinates c) {
+    Tile tile = find_tile(t, c);
+    vec4 value = read_tile(tile, t, c) * t.scale + t.bias;
+    return t.channel == ALL_CHANNELS ? value : vec4(value[t.channel]);
+}
+
+// The frame that normal maps are baked in: MikkTSpace's, from the derivatives of position and coordinates. Solving for
+// dP/du and dP/dv makes it indifferent to mirrored coordinates and to the direction of the screen's axes.
+vec3 from_tangent_space(vec3 tangent_normal, vec3 n, vec3 dPdx, vec3 dPdy, Coordinates c) {
+    float determinant = c.dx.x * c.dy.y - c.dy.x * c.dx.y;
+    vec3 t = (dPdx * c.dy.y - dPdy * c.dx.y) * sign(determinant);
+    vec3 dPdv = (dPdy * c.dx.x - dPdx * c.dy.x) * sign(determinant);
+    t -= n * dot(n, t);
+    if (dot(t, t) == 0.0 || dot(tangent_normal, tangent_normal) == 0.0) return n;
+    t = normalize(t);
+    vec3 b = cross(n, t) * (dot(cross(n, t), dPdv) < 0.0 ? -1.0 : 1.0);
+    return normalize(mat3(t, b, n) * tangent_normal);
+}
+
+// A material's textures in place of its constants; `normal` is turned by its normal map.
+void apply_textures(inout Material material, inout vec3 normal, vec3 position, vec4 uv) {
+    vec4 uv_dx = dFdx(uv), uv_dy = dFdy(uv);
+    vec3 dPdx = dFdx(position), dPdy = dFdy(position);
+    for (uint i = 0u; i < material.input_count; ++i) {
+        TextureInput t = texture_inputs[material.first_input + i];
+        Coordinates c = of_texture(t, uv, uv_dx, uv_dy);
+        vec4 value = read_texture(t, c);
+        if (t.field == FIELD_NORMAL) normal = from_tangent_space(value.xyz, normal, dPdx, dPdy, c);
+        else set_field(material, t.field, value);
+    }
+}
+
+// The same for what casts a shadow.
+void apply_opacity_texture(inout Material material, vec4 uv) {
+    vec4 uv_dx = dFdx(uv), uv_dy = dFdy(uv);
+    for (uint i = 0u; i < material.input_count; ++i) {
+        TextureInput t = texture_inputs[material.first_input + i];
+        if (t.field == FIELD_OPACITY) set_field(material, t.field, read_texture(t, of_texture(t, uv, uv_dx, uv_dy)));
+    }
+}
