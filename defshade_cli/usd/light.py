@@ -68,9 +68,17 @@ def read_light(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Light | None, tuple[
 
 
 def camera_light(camera: Camera) -> DistantLight:
-    """A light of irradiance π along the camera's view: a white Lambertian surface that faces the camera reads 1."""
+    """A light of irradiance π along the camera's view: a white Lambertian surface that faces the camera reads 1.
+
+    It casts no shadow: what the camera sees, its light reaches.
+    """
     return DistantLight(
-        path=CAMERA_LIGHT, world_from_light=camera.world_from_camera, color=np.ones(3), intensity=math.pi, angle=0.0
+        path=CAMERA_LIGHT,
+        world_from_light=camera.world_from_camera,
+        color=np.ones(3),
+        intensity=math.pi,
+        angle=0.0,
+        casts_shadow=False,
     )
 
 
