@@ -37,6 +37,7 @@ FOREIGN = {
     "glcontext": ("gpu",),
     "OpenImageIO": ("image",),
     "PyOpenColorIO": ("image",),
+    "distributed": ("farm",),
     "click": ("cli",),
     "rich": ("cli",),
 }

@@ -31,10 +31,13 @@ from defshade_cli.cli.options import (
 from defshade_cli.cli.progress import frame_name, make_progress, start_logging
 from defshade_cli.cli.table import BatchTable
 from defshade_cli.cli.tally import Tally
-from defshade_cli.errors import BatchError
+from defshade_cli.cli.types import Amount
+from defshade_cli.errors import BatchError, UsageError
 from defshade_cli.settings import RenderJob
 
 if TYPE_CHECKING:
+    from defshade_cli.farm.dask import DaskEngine
+    from defshade_cli.farm.local import LocalEngine
     from defshade_cli.farm.tasks import Chunk
 
 TERMINATED = 143  # 128 + SIGTERM, as shells have it
@@ -44,6 +47,7 @@ _EPILOG = epilog(
     "defshade batch nightly.yaml --existing skip --retries 2 --stats nightly.json",
     "defshade batch nightly.yaml --samples 1 --dry-run",
     "defshade batch nightly.yaml --emit openjd > job.yaml",
+    "defshade batch nightly.yaml --engine dask --scheduler tcp://farm:8786 --resource GPU=1",
 )
 
 
@@ -57,6 +61,9 @@ class Schedule:
     keep_going: bool
     dry_run: bool
     emit: str | None
+    engine: str
+    scheduler: str | None
+    resources: tuple[tuple[str, float], ...]
 
 
 def _takes_jobs(function: Function) -> Function:
@@ -114,6 +121,27 @@ def _batch_options() -> list[Function]:
             default_text="--keep-going",
             help="Whether the other frames are rendered after one has failed for good.",
         ),
+        option(
+            "--engine",
+            type=click.Choice(["local", "dask"]),
+            default="local",
+            default_text="local",
+            help="Where frames are rendered: processes of this machine, or a Dask cluster.",
+        ),
+        option(
+            "--scheduler",
+            metavar="ADDRESS",
+            default_text="a cluster on this machine",
+            help="Dask's scheduler to join, such as tcp://farm:8786.",
+        ),
+        option(
+            "--resource",
+            "resources",
+            type=Amount(),
+            multiple=True,
+            metavar="NAME=N",
+            help="What a Dask worker must have to spare for a chunk, such as GPU=1; repeatable.",
+        ),
         option("--dry-run", is_flag=True, help="Print the tasks and render nothing."),
         option(
             "--emit",
@@ -135,6 +163,8 @@ def batch(jobs: Sequence[RenderJob], reporting: Reporting, schedule: Schedule) -
     from defshade_cli.farm.local import default_workers
     from defshade_cli.farm.tasks import check_batch, chunk_size, frame_count, make_chunks
 
+    if schedule.engine != "dask" and (schedule.scheduler or schedule.resources):
+        raise UsageError("--scheduler and --resource are for --engine dask")
     start_logging(reporting)
     check_batch(jobs)
     frames = frame_count(jobs)
@@ -154,13 +184,10 @@ def _render(
     jobs: Sequence[RenderJob], chunks: Sequence[Chunk], workers: int, reporting: Reporting, schedule: Schedule
 ) -> None:
     from defshade_cli.farm.batch import run_batch
-    from defshade_cli.farm.local import LocalEngine
     from defshade_cli.farm.tasks import frame_count, leaving_no_leftovers
 
-    level = "INFO" if reporting.verbose else "WARNING"
-    command = shlex.join(["defshade", *sys.argv[1:]])
     with make_progress(reporting, frame_count(jobs), BatchTable) as progress, Tally(jobs, reporting) as tally:
-        with leaving_no_leftovers(jobs), LocalEngine(workers, command=command, log_level=level) as engine:
+        with leaving_no_leftovers(jobs), _make_engine(workers, reporting, schedule) as engine:
             for outcome in run_batch(chunks, engine, retries=schedule.retries, keep_going=schedule.keep_going):
                 tally.add(outcome)
                 if outcome.error:
@@ -171,6 +198,21 @@ def _render(
                     click.echo(path)
         if tally.failures:
             raise BatchError(tally.verdict)
+
+
+def _make_engine(workers: int, reporting: Reporting, schedule: Schedule) -> LocalEngine | DaskEngine:
+    from defshade_cli.farm.dask import DaskEngine
+    from defshade_cli.farm.local import LocalEngine
+
+    level = "INFO" if reporting.verbose else "WARNING"
+    command = shlex.join(["defshade", *sys.argv[1:]])
+    if schedule.engine == "local":
+        return LocalEngine(workers, command=command, log_level=level)
+    resources = dict(schedule.resources)
+    engine = DaskEngine(schedule.scheduler, workers, resources=resources, command=command, log_level=level)
+    if not reporting.quiet:
+        click.echo(f"Dask's dashboard: {engine.dashboard}", err=True)
+    return engine
 
 
 def _emit(jobs: Sequence[RenderJob]) -> None:

@@ -89,6 +89,18 @@ class Threshold(click.ParamType):
         return metric or self.metrics[0], Finite().convert(number, param, ctx)
 
 
+class Amount(click.ParamType):
+    """`GPU=1` → ("GPU", 1.0)."""
+
+    name = "amount"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, float]:
+        name, _, number = value.partition("=")
+        if not name or not number:
+            self.fail(f"{value!r} is no amount such as GPU=1", param, ctx)
+        return name, Finite().convert(number, param, ctx)
+
+
 def _suggestion(name: str, choices: Sequence[str]) -> str:
     close = difflib.get_close_matches(name, choices, 1)
     return f"did you mean {close[0]!r}?" if close else f"known are {', '.join(choices)}"

@@ -18,11 +18,8 @@ from numpy.typing import NDArray
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.records import record
 from defshade_cli.image.texture import Source, TexelImage, load_images, resized
-from defshade_cli.scene.material import TEXTURED_FIELDS, Material
+from defshade_cli.scene.material import TEXTURED_FIELDS, UV_SETS, Material
 from defshade_cli.scene.texture import FIRST_UDIM, Texture, TextureInput, Wrap
-
-UV_SETS = 2
-"""Sets of texture coordinates a vertex carries."""
 
 _ANISOTROPY = 8.0
 _WRAPS: tuple[Wrap, ...] = ("black", "clamp", "repeat", "mirror")  # then UDIM: shaders/lib/texture.glsl

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.gpu.textures import UV_SETS
 from defshade_cli.scene.geometry import Drawable, Mesh
-from defshade_cli.scene.material import Material
+from defshade_cli.scene.material import UV_SETS, Material
 
 UvNames = tuple[str, ...]
 

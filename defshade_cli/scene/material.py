@@ -10,6 +10,9 @@ from defshade_cli.scene.texture import TextureInput
 
 Color = tuple[float, float, float]
 
+UV_SETS = 2
+"""Sets of texture coordinates that one material can read."""
+
 TEXTURED_FIELDS = (
     "diffuse_color",
     "emissive_color",

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Usd, UsdShade
 
-from defshade_cli.scene.material import TEXTURED_FIELDS, UNBOUND, Material
+from defshade_cli.scene.material import TEXTURED_FIELDS, UNBOUND, UV_SETS, Material
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.scene.texture import TextureInput
 from defshade_cli.usd.network import Network, computed, node_of
@@ -67,17 +67,19 @@ class _Inputs:
 
 def read_material(stage: Usd.Stage, path: Sdf.Path, shown_as: str, time: Usd.TimeCode) -> ReadMaterial:
     """The material at `path`, reported as `shown_as`; one that is not understood is drawn like an unbound one."""
-    material = UsdShade.Material(stage.GetPrimAtPath(path))
-    if not material:
+    prim = UsdShade.Material(stage.GetPrimAtPath(path))
+    if not prim:
         return _not_understood(shown_as, "the bound material does not exist")
-    shader, _, _ = material.ComputeSurfaceSource()
+    shader, _, _ = prim.ComputeSurfaceSource()
     identifier = shader.GetShaderId() if shader else None
     if identifier != "UsdPreviewSurface":
-        return _not_understood(shown_as, _surface_named(material, shader, identifier))
+        return _not_understood(shown_as, _surface_named(prim, shader, identifier))
     inputs = _read_inputs(shader, Network(time))
+    material = Material(shown_as, **inputs.values, inputs=inputs.textures)
+    inputs.left_out.extend(f"textures at primvar {name}" for name in material.uv_names[UV_SETS:])
     reason = f"not read: {', '.join(inputs.left_out)}"
     return ReadMaterial(
-        Material(shown_as, **inputs.values, inputs=inputs.textures),
+        material,
         time_varying=inputs.network.time_varying,
         issues=(Unsupported(shown_as, reason),) if inputs.left_out else (),
     )
