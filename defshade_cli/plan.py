@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.errors import UsageError
+from defshade_cli.gpu.planes import PLANES, Plane, needed_planes
 from defshade_cli.image.layers import LAYERS
-from defshade_cli.passes.planes import PLANES, Plane, needed_planes
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.light import DistantLight, DomeLight, Light
 from defshade_cli.scene.material import Material

@@ -12,10 +12,10 @@ import moderngl
 import numpy as np
 
 from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.planes import Plane, read_source
 from defshade_cli.gpu.targets import Target
 from defshade_cli.image.environment import sky_of
 from defshade_cli.passes.gbuffer import GBuffer
-from defshade_cli.passes.planes import Plane, read_source
 from defshade_cli.plan import Plan
 from defshade_cli.scene.environment import Environment
 from defshade_cli.scene.light import DomeLight

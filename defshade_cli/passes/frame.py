@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.planes import Plane
 from defshade_cli.gpu.targets import Target, allocate
 from defshade_cli.passes.gbuffer import GBuffer, make_gbuffer
-from defshade_cli.passes.planes import Plane
 from defshade_cli.settings import Layout
 
 Size = tuple[int, int]

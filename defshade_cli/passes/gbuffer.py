@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import moderngl
 
 from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.planes import Plane, uses_standard_depth, write_source
 from defshade_cli.gpu.residence import DrawList
 from defshade_cli.gpu.targets import Target, allocate
 from defshade_cli.gpu.textures import textures_source
-from defshade_cli.passes.planes import Plane, uses_standard_depth, write_source
 from defshade_cli.settings import Layout
 
 

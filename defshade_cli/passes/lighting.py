@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import DEPTH_CLAMP, Gpu
+from defshade_cli.gpu.planes import Plane, read_source, uses_standard_depth
 from defshade_cli.gpu.records import record
 from defshade_cli.gpu.targets import Target
 from defshade_cli.passes.gbuffer import GBuffer
-from defshade_cli.passes.planes import Plane, read_source, uses_standard_depth
 from defshade_cli.passes.shadows import ShadowAtlas
 from defshade_cli.passes.volumes import cone_volume, sphere_volume
 from defshade_cli.plan import Plan, PlannedLight, Volume

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.gpu.planes import uses_standard_depth
 from defshade_cli.image.layers import LAYERS
 from defshade_cli.passes.gbuffer import GBuffer
-from defshade_cli.passes.planes import uses_standard_depth
 from defshade_cli.passes.view import camera_depth
 from defshade_cli.plan import Plan
 from defshade_cli.scene.camera import Camera

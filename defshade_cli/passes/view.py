@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.gpu.planes import uses_standard_depth
 from defshade_cli.gpu.records import record
-from defshade_cli.passes.planes import uses_standard_depth
 from defshade_cli.passes.sampling import CENTRE, Sample
 from defshade_cli.plan import Plan
 from defshade_cli.scene.camera import Camera
