@@ -9,8 +9,8 @@ from build import bulb, camera, drawable, quad, rotated, scene, sphere, sun
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.gpu.planes import PLANES, needed_planes
+from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene

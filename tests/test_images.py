@@ -40,6 +40,7 @@ CASES: dict[str, tuple[str, float | None, RenderSettings]] = {
     "materials.packed": ("materials", None, replace(SETTINGS, layout="packed")),
     "materials.rgba8": ("materials", None, replace(SETTINGS, layout="rgba8")),
     "purposes.guide": ("purposes", None, replace(SETTINGS, purposes=("default", "proxy", "guide"))),
+    "subdivision.low": ("subdivision", None, replace(SETTINGS, complexity="low")),
     "showcase.8": ("showcase", None, replace(SETTINGS, samples=8)),
 }
 """Reference → stage, frame, settings."""
@@ -84,7 +85,8 @@ def test_a_few_wrong_pixels_are_tolerated_and_a_shift_is_not() -> None:
 
 
 def _draw(pipeline: Pipeline, stage: str, frame: float | None, settings: RenderSettings) -> Film:
-    reader = StageReader(open_stage(resources.SCENES / f"{stage}.usda"), purposes=settings.purposes)
+    opened = open_stage(resources.SCENES / f"{stage}.usda")
+    reader = StageReader(opened, purposes=settings.purposes, complexity=settings.complexity, size=settings.size)
     scene = reader.read(reader.first_frame() if frame is None else frame)
     return pipeline.render(scene, make_plan(scene, settings))
 

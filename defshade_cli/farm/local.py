@@ -32,7 +32,7 @@ _PATIENCE = 5.0  # seconds that a worker has to end when asked
 class LocalEngine:
     """An Engine of up to `workers` processes; a context manager that ends them.
 
-    threads: of the software driver, a worker; None shares the cores evenly.
+    threads: of the software driver, a worker; None shares the cores evenly. LP_NUM_THREADS in the environment wins.
     command: goes into the files' headers.  log_level: of the workers' logs.
     """
 
@@ -116,7 +116,7 @@ class _Worker:
                 stdout=self._log,
                 stderr=subprocess.STDOUT,
                 pass_fds=[theirs.fileno()],
-                env={**os.environ, "LP_NUM_THREADS": str(threads)},
+                env={"LP_NUM_THREADS": str(threads), **os.environ},
                 start_new_session=True,  # an interrupt from the keyboard is the scheduler's to handle
             )
 
