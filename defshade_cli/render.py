@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, nullcontext
+from collections.abc import Generator, Iterator
+from contextlib import ExitStack, closing, contextmanager, nullcontext
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from types import TracebackType
@@ -70,7 +70,7 @@ class Renderer:
         self._stack.close()
 
 
-def run(job: RenderJob, *, command: str = "", renderer: Renderer | None = None) -> Iterator[FrameResult]:
+def run(job: RenderJob, *, command: str = "", renderer: Renderer | None = None) -> Generator[FrameResult, None, None]:
     """Render the job's frames in order, lazily. `command` goes into the files' headers.
 
     renderer: lent for the job; without it the job has its own.
@@ -113,7 +113,8 @@ def render(stage: str | Path, *, camera: str | None = None, frame: float | None 
     if unknown := sorted(options.keys() - known):
         raise UsageError(f"no render option named {', '.join(unknown)}; there are {', '.join(sorted(known))}")
     job = RenderJob(Path(stage), (frame,) if frame is not None else (), camera, RenderSettings(**options))
-    result = next(run(job))
+    with closing(run(job)) as frames:
+        result = next(frames)
     assert result.film is not None
     return result.film
 

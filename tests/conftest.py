@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -39,3 +40,13 @@ def gpu() -> Iterator[Gpu]:
 
     with Gpu() as gpu:
         yield gpu
+
+
+@pytest.fixture(autouse=True)
+def _log_as_before() -> Iterator[None]:
+    """A command that runs in this process sets up the log; the next test finds it untouched."""
+    logger = logging.getLogger("defshade")
+    level, handlers = logger.level, logger.handlers
+    yield
+    logger.setLevel(level)
+    logger.handlers = handlers

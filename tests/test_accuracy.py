@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from build import at, beauty, bulb, camera, quad, rotated, scene, sphere, sun
 from numpy.typing import NDArray
 
+from build import at, beauty, bulb, camera, quad, rotated, scene, sphere, sun
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan

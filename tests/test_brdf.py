@@ -9,7 +9,6 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from gpu_harness import BrdfHarness
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from defshade_cli.measure import brdf, furnace
 from defshade_cli.measure.brdf import D_GGX, Surface, alpha_from_roughness
 from defshade_cli.settings import SHADINGS, Shading
 from defshade_cli.spaces import normalize
+from gpu_harness import BrdfHarness
 
 ROUGHNESSES = (0.0, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
 COSINES = (1.0, 0.7, 0.4, 0.2, 0.1, 0.05, 0.02, 0.005)

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pxr import UsdGeom
-from stages import reasons, stage_of
 
 from defshade_cli.errors import PrimNotFound, StageError
 from defshade_cli.scene.camera import Camera
@@ -19,6 +18,7 @@ from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import transform_points
 from defshade_cli.usd.camera import FRAMED, find_cameras, framed_camera
 from defshade_cli.usd.reader import StageReader
+from stages import reasons, stage_of
 
 CUBE = 'def Cube "cube" {\n}\n'
 

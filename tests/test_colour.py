@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from films import film, layer_values
 
 from defshade_cli.errors import UsageError
 from defshade_cli.image.colour import display_space, displays, picture, resolve_view, to_display
 from defshade_cli.image.layers import LAYERS
+from films import film, layer_values
 
 SRGB, ACES, PLAIN = "sRGB - Display", "ACES 2.0 - SDR 100 nits (Rec.709)", "Un-tone-mapped"
 

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import film
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -17,6 +16,7 @@ from defshade_cli.errors import OutputError, UsageError
 from defshade_cli.image import files
 from defshade_cli.image.compare import Comparison, compare, difference
 from defshade_cli.settings import OutputSettings
+from films import film
 
 images = arrays(np.float32, (3, 4, 3), elements=st.floats(0, 100, width=32))
 

@@ -6,18 +6,18 @@ import math
 
 import numpy as np
 import pytest
+from pxr import Usd
+
 import stages
 from build import at, camera
-from prims import define_cube, define_mesh
-from pxr import Usd
-from stages import move
-
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import COMPLEXITIES, RenderSettings
 from defshade_cli.usd import complexity
 from defshade_cli.usd.complexity import EDGE_PIXELS, FINEST_LEVEL, FLAT_PIXELS, View, choose_levels
 from defshade_cli.usd.geometry import Surface, read_surface
+from prims import define_cube, define_mesh
+from stages import move
 
 BALL = """def Mesh "ball" {
     point3f[] points = [(-1,-1,-1),(-1,-1,1),(-1,1,-1),(-1,1,1),(1,-1,-1),(1,-1,1),(1,1,-1),(1,1,1)]

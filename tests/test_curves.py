@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
-from prims import Drawn, new_stage, read, reasons, set_primvar
 from pxr import UsdGeom, Vt
 from scipy.interpolate import BSpline
 
 from defshade_cli.usd.basis import Kind, sample_curves
 from defshade_cli.usd.geometry import is_time_varying
+from prims import Drawn, new_stage, read, reasons, set_primvar
 
 LINE = [(0, 0, 0), (0, 0, 1), (0, 0, 2), (0, 0, 3)]
 SQUARE = [(1, 1, 0), (-1, 1, 0), (-1, -1, 0), (1, -1, 0)]

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from build import camera, quad, rotated, scene, sphere
 from numpy.typing import NDArray
-from stages import stage_of
 
+from build import camera, quad, rotated, scene, sphere
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.environment import sky_of
 from defshade_cli.passes.pipeline import Pipeline
@@ -21,6 +20,7 @@ from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderSettings
 from defshade_cli.usd.reader import StageReader
+from stages import stage_of
 
 WHITE = Material("/white", diffuse_color=(1, 1, 1), roughness=1.0, ior=1.0)
 MIRROR = Material("/mirror", diffuse_color=(1, 1, 1), metallic=1.0, roughness=0.0)

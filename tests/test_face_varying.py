@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cages import CUBE_FACES, TWO_BY_TWO, grid_faces, grid_points, limit_weights, meshes, row, topology
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from cages import CUBE_FACES, TWO_BY_TWO, grid_faces, grid_points, limit_weights, meshes, row, topology
 from defshade_cli.usd.subdivision import Topology, refine, refine_face_varying
 
 

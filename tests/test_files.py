@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from films import film
 
 from defshade_cli.errors import OutputError, UsageError
 from defshade_cli.image import files
@@ -22,6 +21,7 @@ from defshade_cli.image.encoders import SUFFIXES
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import LAYERS
 from defshade_cli.settings import COMPRESSIONS, OutputSettings
+from films import film
 
 COLOURS = [name for name, layer in LAYERS.items() if layer.is_color]
 DATA = [name for name in LAYERS if name not in COLOURS]

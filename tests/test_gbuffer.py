@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from build import bulb, camera, drawable, quad, rotated, scene, sphere, sun
 from numpy.typing import NDArray
 
+from build import bulb, camera, drawable, quad, rotated, scene, sphere, sun
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import PLANES, needed_planes
 from defshade_cli.passes.pipeline import Pipeline

@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
+
+from defshade_cli.usd.geometry import is_time_varying, read_surface
 from prims import (
     CUBE_FACES,
     CUBE_POINTS,
@@ -26,9 +29,6 @@ from prims import (
     try_read,
     volume,
 )
-from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
-
-from defshade_cli.usd.geometry import is_time_varying, read_surface
 
 TRIANGLE = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from prims import Drawn, area, corners, is_watertight, new_stage, read, reasons, set_primvar, vector_areas, volume
 from pxr import Usd, UsdGeom, Vt
 
 from defshade_cli.usd.revolution import SEGMENTS
+from prims import Drawn, area, corners, is_watertight, new_stage, read, reasons, set_primvar, vector_areas, volume
 
 STEP = 2.0 * math.pi / SEGMENTS
 ROUND = math.sin(STEP) / STEP

@@ -10,6 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
+
+from defshade_cli.usd.binding import NOTHING_BOUND, Bindings
+from defshade_cli.usd.instancing import Piece, Placement, place
+from defshade_cli.usd.reader import StageReader
 from stages import (
     MATERIALS,
     TREE,
@@ -23,10 +27,6 @@ from stages import (
     read,
     stage_of,
 )
-
-from defshade_cli.usd.binding import NOTHING_BOUND, Bindings
-from defshade_cli.usd.instancing import Piece, Placement, place
-from defshade_cli.usd.reader import StageReader
 
 DEFAULT = Usd.TimeCode.Default()
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from build import beauty, camera, quad, scene
 from numpy.typing import NDArray
 
+from build import beauty, camera, quad, scene
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.passes.view import lens_offset

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pxr import Usd, UsdLux
-from stages import reasons, stage_of
 
 from defshade_cli.scene.light import CylinderLight, DiskLight, DistantLight, Light, RectLight, Shaping, SphereLight
 from defshade_cli.scene.scene import Scene
 from defshade_cli.usd.light import CAMERA_LIGHT, temperature_color
 from defshade_cli.usd.reader import StageReader
+from stages import reasons, stage_of
 
 CUBE = 'def Cube "cube" {\n}\n'
 DEFAULT = Usd.TimeCode.Default()

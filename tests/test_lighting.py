@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from build import GREY, at, beauty, bulb, camera, drawable, quad, rotated, scene, sphere, sun
 from numpy.typing import NDArray
 
+from build import GREY, at, beauty, bulb, camera, drawable, quad, rotated, scene, sphere, sun
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.measure import furnace
 from defshade_cli.measure.brdf import evaluate_brdf

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
 from cages import (
     CUBE_FACES,
     CUBE_POINTS,
@@ -22,8 +24,6 @@ from cages import (
     topology,
     wheel,
 )
-from numpy.testing import assert_allclose, assert_array_equal
-
 from defshade_cli.usd.subdivision import Topology, limit, refine
 
 

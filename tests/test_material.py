@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from stages import material_names, reasons, stage_of
 
 from defshade_cli.scene.material import UNBOUND, Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.texture import ImageFile, Texture, TextureInput
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.stage import open_stage
+from stages import material_names, reasons, stage_of
 
 BINDS = '(prepend apiSchemas = ["MaterialBindingAPI"])'
 

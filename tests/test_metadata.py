@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from films import HEIGHT, WIDTH, WINDOW, film, tilted_camera
 
 from defshade_cli import __version__
 from defshade_cli.image import files
 from defshade_cli.image.metadata import frame_rate, provenance, world_to_camera, world_to_ndc
 from defshade_cli.scene.camera import Camera
 from defshade_cli.settings import OutputSettings
+from films import HEIGHT, WIDTH, WINDOW, film, tilted_camera
 
 
 @pytest.fixture

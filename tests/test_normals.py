@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from prims import CUBE_FACES, CUBE_POINTS, define_cube, define_mesh, read, reasons, set_primvar, vector_areas
 from pxr import UsdGeom, Vt
+
+from prims import CUBE_FACES, CUBE_POINTS, define_cube, define_mesh, read, reasons, set_primvar, vector_areas
 
 FLOOR = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
 

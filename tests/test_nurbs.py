@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from prims import new_stage, read, reasons, set_primvar
 from pxr import UsdGeom, Vt
 
 from defshade_cli.usd.geometry import is_time_varying
+from prims import new_stage, read, reasons, set_primvar
 
 HALF = math.sqrt(0.5)
 CIRCLE = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]], float)

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from build import GREY, bulb, camera, drawable, quad, scene, sphere, sun
 
+from build import GREY, bulb, camera, drawable, quad, scene, sphere, sun
 from defshade_cli.errors import UsageError
 from defshade_cli.passes.view import camera_depth, clip_from_camera
 from defshade_cli.plan import make_plan

@@ -8,6 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pxr import Gf, Usd, UsdGeom, Vt
+
+from defshade_cli.scene.scene import Scene
+from defshade_cli.usd.reader import StageReader
+from defshade_cli.usd.stage import open_stage
 from stages import (
     MATERIALS,
     TREE,
@@ -22,10 +26,6 @@ from stages import (
     reasons,
     stage_of,
 )
-
-from defshade_cli.scene.scene import Scene
-from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
 
 DEFAULT = Usd.TimeCode.Default()
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import stages
-from prims import reasons, try_read
 from pxr import Usd
-from stages import instance
 
+import stages
 from defshade_cli.scene.scene import Scene
 from defshade_cli.usd.geometry import is_time_varying
+from prims import reasons, try_read
+from stages import instance
 
 CLOUD = """def Points "dust" {
     point3f[] points = [(0, 0, 0), (1, 2, 3), (5, 0, 0)]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from prims import DEFAULT, define_cube, define_mesh, read, reasons, set_primvar
 from pxr import Sdf, UsdGeom, Vt
+
+from prims import DEFAULT, define_cube, define_mesh, read, reasons, set_primvar
 
 POINTS = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [0, 1, 0]]
 FACES = [[0, 1, 4, 5], [1, 2, 3, 4]]

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from build import at, bulb, rotated, sun
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from build import at, bulb, rotated, sun
 from defshade_cli.measure.light import irradiance_at, shaping_factor
 from defshade_cli.measure.reference import Planes, reference_radiance, shade, surface_from_planes
 from defshade_cli.scene.camera import Camera

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from prims import CUBE_FACES, CUBE_POINTS, Drawn, define_cube, define_mesh, is_watertight, read, reasons, set_primvar
-from prims import volume as volume_of
 from pxr import Gf, Usd, UsdGeom, UsdShade, Vt
 
 from defshade_cli.usd.geometry import is_time_varying, read_surface
 from defshade_cli.usd.tessellation import Tessellation
+from prims import CUBE_FACES, CUBE_POINTS, Drawn, define_cube, define_mesh, is_watertight, read, reasons, set_primvar
+from prims import volume as volume_of
 
 GRID = [[x, y, 0] for y in range(3) for x in range(3)]
 GRID_FACES = [[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]]

@@ -8,18 +8,18 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from films import film
 
 from defshade_cli.farm.fingerprint import Fingerprint
 from defshade_cli.farm.targets import FINGERPRINT
 from defshade_cli.image.files import read_header, remove_abandoned, write
 from defshade_cli.render import Renderer, run
 from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
+from films import film
 
 PART = '#usda 1.0\n(defaultPrim = "Ball")\ndef Sphere "Ball"\n{\n    double radius = 1\n}\n'
 SHOT = """#usda 1.0
@@ -45,8 +45,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture(scope="module")
-def renderer() -> Renderer:
-    return Renderer()
+def renderer() -> Iterator[Renderer]:
+    with Renderer() as renderer:
+        yield renderer
 
 
 JOB = RenderJob(

@@ -78,6 +78,18 @@ def test_records_reach_the_gpu_as_they_were_written(gpu: Gpu) -> None:
     np.testing.assert_allclose(np.frombuffer(values.read(), np.float32), [4, 6, 8, 0.2, 2, 11, 12, 2], rtol=1e-7)
 
 
+def test_contexts_keep_to_themselves(gpu: Gpu) -> None:
+    """Another context is opened, used, and closed while a third is current: this one's buffers stay what they were."""
+    mine = gpu.context.buffer(b"mine")
+    second = Gpu()
+    second.keep(second.context.buffer(b"them"))
+    third = Gpu()
+    second.close()
+    third.close()
+    gpu.make_current()
+    assert mine.read() == b"mine"
+
+
 def test_libraries_hold_no_main_and_entry_points_do() -> None:
     for path in SHADERS.rglob("*.*"):
         if path.suffix in (".vert", ".frag", ".comp", ".glsl"):

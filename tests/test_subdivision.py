@@ -7,6 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from numpy.typing import NDArray
+
 from cages import (
     CUBE_FACES,
     CUBE_POINTS,
@@ -21,11 +26,6 @@ from cages import (
     topology,
     wheel,
 )
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from numpy.testing import assert_allclose, assert_array_equal
-from numpy.typing import NDArray
-
 from defshade_cli.usd.subdivision import Topology, limit, refine, refine_face_varying
 
 OPENSUBDIV = Path(__file__).parent / "references" / "subdivision_opensubdiv.npz"

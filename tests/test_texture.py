@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from build import at, bulb, camera, drawable, quad, scene, sun
 from numpy.typing import NDArray
 
+from build import at, bulb, camera, drawable, quad, scene, sun
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.textures import group_images
 from defshade_cli.image import texture as images

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from prims import define_cube, define_mesh, read, reasons, set_primvar
 from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
 from defshade_cli.usd.geometry import is_time_varying
+from prims import define_cube, define_mesh, read, reasons, set_primvar
 
 POINTS = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [0, 1, 0]]
 FACES = [[0, 1, 4, 5], [1, 2, 3, 4]]

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import moderngl
 
@@ -39,12 +39,15 @@ class Gpu:
     Raises GpuError where there is no EGL, no such device, or a driver below OpenGL 4.5.
     """
 
+    _open: ClassVar[list[Gpu]] = []
+
     def __init__(self, device: int | None = None) -> None:
         self.context = _create_context(device)
         self._stack = ExitStack()
-        self._stack.callback(self.context.release)
+        self._open.append(self)
         if self.context.version_code < _REQUIRED_VERSION:
-            raise GpuError(f"OpenGL 4.5 is needed; {self.renderer} has {self.context.version_code / 100:.1f}")
+            self.close()
+            raise GpuError(f"OpenGL 4.5 is needed; this driver has {self.context.version_code / 100:.1f}")
         self._get_address = _egl_get_proc_address()
         self._entry_point("glClipControl", ctypes.c_uint, ctypes.c_uint)(_UPPER_LEFT, _ZERO_TO_ONE)
         self.shaders = ShaderLibrary(self.context)
@@ -55,7 +58,20 @@ class Gpu:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.close()
+
+    def make_current(self) -> None:
+        """Let GL calls reach this context; the newest one is current until then."""
+        self.context.__enter__()
+
+    def close(self) -> None:
+        """Release all that was kept, in this context whichever is current, and hand on to the newest one open."""
+        self.make_current()
         self._stack.close()
+        self.context.release()
+        self._open.remove(self)
+        if self._open:
+            self._open[-1].make_current()
 
     @property
     def renderer(self) -> str:

@@ -29,6 +29,8 @@ class Pipeline:
     """Renders one frame after another on a Gpu, keeping what they share: buffers, targets, compiled passes."""
 
     def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        gpu.make_current()
         self._scene = GpuScene(gpu)
         self._frame = Frame(gpu)
         self._view = RecordBuffer(gpu, VIEW)
@@ -45,6 +47,7 @@ class Pipeline:
 
     def render(self, scene: Scene, plan: Plan) -> Film:
         """The plan's layers. Raises GpuError."""
+        self._gpu.make_current()
         draws = self._scene.update(scene)
         layers: dict[str, NDArray[np.float32]] = {}
         if plan.lit:
@@ -62,6 +65,7 @@ class Pipeline:
 
     def planes(self, scene: Scene, plan: Plan) -> Planes:
         """The float GBuffer at the pixels' centres: what the float64 reference is evaluated on."""
+        self._gpu.make_current()
         return self._drawn_planes(self._scene.update(scene), plan)
 
     def _beauty(self, draws: DrawList, scene: Scene, plan: Plan) -> NDArray[np.float32]:
