@@ -4,6 +4,7 @@
 #   make test    run the tests
 #   make lint    ruff and mypy
 #   make docs    write docs/commands.md anew from the commands
+#   make tables  measure the layouts anew, for the table in docs/lighting.md
 #   make accuracy  measure accumulated light against Mitsuba 3, into docs/accuracy.md
 #   make wheel   build dist/*.whl
 #   make clean   remove what was built, the virtual environment too
@@ -12,7 +13,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lint docs accuracy wheel clean
+.PHONY: demo test lint docs tables accuracy wheel clean
 
 PYTHON ?= python3
 BIN := .venv/bin
@@ -49,6 +50,9 @@ docs: .venv/.ready
 
 accuracy: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.accuracy docs/accuracy.md
+
+tables: .venv/.ready
+	$(BIN)/python -m defshade_cli.measure.layouts docs/lighting.md
 
 wheel: .venv/.ready
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
