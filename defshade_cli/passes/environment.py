@@ -63,12 +63,7 @@ class EnvironmentPass:
         self._gpu.context.enable_only(moderngl.BLEND)
         self._gpu.context.blend_func = moderngl.ONE, moderngl.ONE
         sky = sky_of(dome)
-        textures = {"sky": self._texture(sky), "plane_depth": gbuffer.target.depth}
-        textures |= {f"plane_{name}": texture for name, texture in gbuffer.target.textures.items()}
-        for unit, (name, texture) in enumerate(textures.items()):
-            if texture and name in self._program:
-                texture.use(unit)
-                self._program[name] = unit
+        gbuffer.bind(self._program, sky=self._texture(sky))
         for name, value in _uniforms(dome, sky).items():
             if name in self._program:
                 self._program[name] = value

@@ -22,6 +22,15 @@ class GBuffer:
     planes: tuple[Plane, ...]
     layout: Layout
 
+    def bind(self, program: moderngl.Program, **others: moderngl.Texture | None) -> None:
+        """Let `program` read the planes, and `others` by the names of their samplers, where it has those."""
+        textures = {f"plane_{name}": texture for name, texture in self.target.textures.items()}
+        bound = {**textures, "plane_depth": self.target.depth, **others}
+        for unit, (name, texture) in enumerate(bound.items()):
+            if texture and name in program:
+                texture.use(unit)
+                program[name] = unit
+
 
 def make_gbuffer(gpu: Gpu, size: tuple[int, int], planes: tuple[Plane, ...], layout: Layout) -> GBuffer:
     """An empty GBuffer of (width, height). Raises GpuError."""

@@ -73,7 +73,7 @@ class LightingPass:
         radiance.framebuffer.use()
         radiance.framebuffer.depth_mask = False
         self._context.enable_only(moderngl.NOTHING)
-        self._bind(self._emission.program, gbuffer, None)
+        gbuffer.bind(self._emission.program)
         self._emission.render(vertices=3)
 
     def add(
@@ -87,7 +87,7 @@ class LightingPass:
         self._context.depth_func = ">" if uses_standard_depth(gbuffer.layout) else "<"
         kinds = [planned.volume for planned in lights]
         for volume in dict.fromkeys(kinds):
-            self._bind(self._volumes[volume].program, gbuffer, shadows)
+            gbuffer.bind(self._volumes[volume].program, shadow_atlas=shadows.depth if shadows else None)
             self._draw_volumes(volume, kinds.index(volume), kinds.count(volume))
         self._context.disable_direct(DEPTH_CLAMP)
 
@@ -96,14 +96,6 @@ class LightingPass:
         self._context.enable_only(moderngl.BLEND | (moderngl.NOTHING if volume == "quad" else local))
         array.program["first_light"] = first
         array.render(vertices=3 if volume == "quad" else -1, instances=count)
-
-    def _bind(self, program: moderngl.Program, gbuffer: GBuffer, shadows: ShadowAtlas | None) -> None:
-        textures = {"plane_depth": gbuffer.target.depth, "shadow_atlas": shadows.depth if shadows else None}
-        textures |= {f"plane_{name}": texture for name, texture in gbuffer.target.textures.items()}
-        for unit, (name, texture) in enumerate(textures.items()):
-            if texture and name in program:
-                texture.use(unit)
-                program[name] = unit
 
 
 def _volume_array(gpu: Gpu, volume: Volume, program: moderngl.Program) -> moderngl.VertexArray:

@@ -12,6 +12,7 @@ Formulas: the UsdLux schema text (LightAPI, ShapingAPI and the light types) of u
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -41,7 +42,7 @@ class Shaping:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Light:
+class Light(ABC):
     """What all lights share.
 
     world_from_light: (4, 4) float64, scale included: sizes are world-space ones.
@@ -84,9 +85,9 @@ class Light:
         return self.color * (self.intensity * math.exp2(self.exposure))
 
     @property
+    @abstractmethod
     def size_factor(self) -> float:
         """The divisor that `normalize` stands for: world-space area, or the distant light's projected solid angle."""
-        raise NotImplementedError
 
     @property
     def radiance(self) -> NDArray[np.float64]:
