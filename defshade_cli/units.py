@@ -12,8 +12,3 @@ import math
 def exposure_scale(stops: float) -> float:
     """Linear factor of `stops` of exposure: 2^stops."""
     return math.exp2(stops)
-
-
-def stops(scale: float) -> float:
-    """Inverse of `exposure_scale`, for scale > 0."""
-    return math.log2(scale)

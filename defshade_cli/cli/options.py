@@ -191,6 +191,13 @@ def _image_options(layers: Sequence[str]) -> list[Function]:
             default_text=",".join(layers),
             help="Layers to write, with commas between, of those listed below; or 'all'.",
         ),
+        *_shading_options(),
+    ]
+
+
+def _shading_options() -> list[Function]:
+    option = functools.partial(click.option, cls=Option, heading="Image")
+    return [
         option(
             "--shading",
             type=click.Choice(settings.SHADINGS),
