@@ -1,0 +1,103 @@
+"""The options that commands share, and the frozen job that they become."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from defshade_cli.cli.options.image import image_options
+from defshade_cli.cli.options.option import Function, HeadedCommand, Option, epilog
+from defshade_cli.cli.options.output import output_options
+from defshade_cli.cli.options.run import Reporting, run_options
+from defshade_cli.cli.options.stage import stage_options
+from defshade_cli.errors import UsageError
+from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
+
+__all__ = [
+    "Function",
+    "HeadedCommand",
+    "Option",
+    "Reporting",
+    "epilog",
+    "make_job",
+    "render_options",
+    "take",
+    "takes_job",
+    "takes_stage",
+    "with_output",
+]
+
+_RENDER = RenderSettings()
+
+
+def takes_stage(function: Function) -> Function:
+    """Give a command the options of stage and image: it is called with a RenderJob and its own keywords."""
+    return _takes([_scene_argument(), *stage_options(), *image_options(_RENDER.layers)], function)
+
+
+def takes_job(*, layers: Sequence[str] = _RENDER.layers, name: str = "{scene}") -> Callable[[Function], Function]:
+    """Give a command every option of a render: it is called with a RenderJob and a Reporting.
+
+    layers: written when the user names none.  name: of the output, without frame and suffix, likewise.
+    """
+
+    def decorate(function: Function) -> Function:
+        @functools.wraps(function)
+        def command(job: RenderJob, **values: Any) -> Any:
+            return function(with_output(job, name), Reporting(**take(values, Reporting)), **values)
+
+        return _takes([_scene_argument(), *render_options(layers, name)], command)
+
+    return decorate
+
+
+def render_options(layers: Sequence[str] = _RENDER.layers, name: str = "{scene}") -> list[Function]:
+    """Every option of a render, with the defaults that takes_job tells of."""
+    return [*stage_options(), *image_options(layers), *output_options(name), *run_options()]
+
+
+def _takes(options: list[Function], function: Function) -> Function:
+    @functools.wraps(function)
+    def command(**values: Any) -> Any:
+        job = make_job(values)
+        return function(job, **values)
+
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def make_job(values: dict[str, Any]) -> RenderJob:
+    """The RenderJob in a command's `values`, which keep only what is the command's own."""
+    if values["size"] and values["width"]:
+        raise UsageError("--size and --width exclude each other")
+    if values["frames"] and values["default_time"]:
+        raise UsageError("--frames and --default-time exclude each other")
+    default_time = values.pop("default_time")
+    values["frames"] = (None,) if default_time else values["frames"] or ()
+    return RenderJob(
+        stage=values.pop("scene"),
+        settings=RenderSettings(**take(values, RenderSettings)),
+        output=OutputSettings(**take(values, OutputSettings)),
+        **take(values, RenderJob),
+    )
+
+
+def take(values: dict[str, Any], owner: Any) -> dict[str, Any]:
+    """Those of `values` that are fields of the dataclass `owner`, removed from `values`."""
+    return {name: values.pop(name) for name in owner.__dataclass_fields__ if name in values}
+
+
+def with_output(job: RenderJob, name: str) -> RenderJob:
+    """`job` with the default file name where the user gave none."""
+    patterns = job.output.patterns or (f"{name}.####.exr" if len(job.frames) > 1 else f"{name}.exr",)
+    return replace(job, output=replace(job.output, patterns=patterns))
+
+
+def _scene_argument() -> Function:
+    return click.argument("scene", type=click.Path(path_type=Path))

@@ -1,0 +1,102 @@
+"""What the image is of, and how it is made."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+
+import click
+
+from defshade_cli import settings
+from defshade_cli.cli.options.option import Function, Option
+from defshade_cli.cli.types import Finite, Names, Size
+from defshade_cli.image.layers import LAYERS
+from defshade_cli.settings import RenderSettings
+
+_RENDER = RenderSettings()
+
+
+def image_options(layers: Sequence[str]) -> list[Function]:
+    """Under the heading Image. layers: written when the user names none."""
+    option = functools.partial(click.option, cls=Option, heading="Image")
+    return [
+        option(
+            "--size",
+            type=Size(),
+            metavar="WxH",
+            help="Size in pixels. The default is the stage's render settings, then 1920x1080.",
+        ),
+        option(
+            "--width",
+            type=click.IntRange(min=1),
+            metavar="PIXELS",
+            help="Width in pixels; the height follows the camera's aspect.",
+        ),
+        option(
+            "--samples",
+            type=click.IntRange(min=1),
+            default=_RENDER.samples,
+            default_text=str(_RENDER.samples),
+            metavar="N",
+            help="Samples a pixel of the beauty: places in the pixel, on the lens and on every light. One sample takes "
+            "lights for points. Data layers are one sample at the pixel's centre.",
+        ),
+        option(
+            "--layers",
+            type=Names("layer", tuple(LAYERS)),
+            metavar="NAMES",
+            default=tuple(layers),
+            default_text=",".join(layers),
+            help="Layers to write, with commas between, of those listed below; or 'all'.",
+        ),
+        *_shading_options(),
+    ]
+
+
+def _shading_options() -> list[Function]:
+    option = functools.partial(click.option, cls=Option, heading="Image")
+    return [
+        option(
+            "--shading",
+            type=click.Choice(settings.SHADINGS),
+            default=_RENDER.shading,
+            default_text=str(_RENDER.shading),
+            help="Lighting equation: UsdPreviewSurface's, or the classic one of deferred renderers.",
+        ),
+        option(
+            "--shadows/--no-shadows",
+            default=_RENDER.shadows,
+            default_text="--shadows",
+            help="Whether geometry hides lights.",
+        ),
+        option(
+            "--background/--no-background",
+            default=_RENDER.background,
+            default_text="--background",
+            help="Whether dome lights are seen behind the geometry.",
+        ),
+        option(
+            "--gbuffer",
+            "layout",
+            type=click.Choice(settings.LAYOUTS),
+            default=_RENDER.layout,
+            default_text=str(_RENDER.layout),
+            help="Encoding of the GBuffer that lighting reads; data layers are always read as float.",
+        ),
+        option(
+            "--complexity",
+            type=click.Choice(settings.COMPLEXITIES),
+            default=_RENDER.complexity,
+            default_text=str(_RENDER.complexity),
+            help="Refinement of subdivision surfaces: auto goes by their size in the image; low draws their cages, "
+            "medium, high and veryhigh one, two and three levels.",
+        ),
+        option(
+            "--exposure",
+            type=Finite(),
+            metavar="STOPS",
+            default=_RENDER.exposure,
+            default_text=str(_RENDER.exposure),
+            help="Stops added to the camera's exposure.",
+        ),
+    ]

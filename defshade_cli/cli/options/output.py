@@ -1,0 +1,53 @@
+"""How an image becomes files."""
+
+from __future__ import annotations
+
+import functools
+
+import click
+
+from defshade_cli import settings
+from defshade_cli.cli.options.option import Function, Option
+from defshade_cli.settings import OutputSettings
+
+_OUTPUT = OutputSettings()
+
+
+def output_options(name: str) -> list[Function]:
+    """Under the heading Output. name: of the file when the user gives none, without frame and suffix."""
+    option = functools.partial(click.option, cls=Option, heading="Output")
+    return [
+        option(
+            "-o",
+            "--output",
+            "patterns",
+            multiple=True,
+            metavar="FILE",
+            default_text=f"{name}.exr; {name}.####.exr for several frames",
+            help="File to write, repeatable; the suffix picks the format. "
+            "Tokens: {scene}, {camera}, and the frame as ####, %04d or $F4.",
+        ),
+        option(
+            "--existing",
+            type=click.Choice(settings.EXISTING),
+            default=_OUTPUT.existing,
+            default_text=str(_OUTPUT.existing),
+            help="What to do with a file that is there already.",
+        ),
+        option(
+            "--float",
+            "full_float",
+            is_flag=True,
+            help="32-bit channels in EXR for light and reflectance too; all else is 32-bit always.",
+        ),
+        option(
+            "--compression",
+            type=click.Choice(settings.COMPRESSIONS),
+            default=_OUTPUT.compression,
+            default_text=str(_OUTPUT.compression),
+            help="Compression of EXR.",
+        ),
+        option("--split-layers", is_flag=True, help="One file a layer in place of one file with all."),
+        option("--display", metavar="NAME", help="OCIO display for formats such as PNG, not for EXR."),
+        option("--view", metavar="NAME", help="OCIO view of the display."),
+    ]

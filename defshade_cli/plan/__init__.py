@@ -1,0 +1,7 @@
+"""What one frame needs, and what it skips and why: decided once, before anything is drawn."""
+
+from defshade_cli.plan.decisions import Decision
+from defshade_cli.plan.lights import PlannedLight, Volume, volume_of
+from defshade_cli.plan.plan import Plan, make_plan
+
+__all__ = ["Decision", "Plan", "PlannedLight", "Volume", "make_plan", "volume_of"]

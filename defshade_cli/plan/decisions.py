@@ -1,0 +1,55 @@
+"""What a plan keeps and what it skips, each with the fact it follows from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from defshade_cli.gpu.planes import PLANES
+from defshade_cli.image.layers import LAYERS
+
+if TYPE_CHECKING:
+    from defshade_cli.plan.plan import Plan
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """One thing the plan chose, and the fact it follows from."""
+
+    subject: str
+    choice: str
+    reason: str
+
+
+def explain(plan: Plan) -> Iterator[Decision]:
+    """Decision by decision, in the order of the pipeline."""
+    yield Decision("layout", plan.layout, "as asked")
+    yield _explain_subdivision(plan)
+    for plane in PLANES:
+        yield _kept(f"plane {plane.name}", plane in plan.planes, "a material or layer needs it", "nothing needs it")
+    for volume in ("quad", "sphere", "cone"):
+        count = sum(planned.volume == volume for planned in plan.lights)
+        yield Decision(f"{volume} volumes", f"{count} drawn" if count else "skipped", "lights that reach geometry")
+    yield _kept("shadow maps", plan.shadows, "a light casts them", "no light casts any, or none were asked")
+    yield _kept("environment", bool(plan.domes), "a dome lights the scene", "no dome")
+    yield _kept("cutout", plan.cutout, "some opacity is or may be below 1", "no opacity is below 1")
+    yield _kept("textures", plan.textures, "a material reads them", "no material reads any")
+    if any(LAYERS[name].source != "lighting" for name in plan.layers):
+        jittered, shared = "the beauty's is jittered, quantised or dithered", "the beauty's own float sample serves"
+        yield _kept("data GBuffer", plan.data_pass or not plan.lit, jittered if plan.lit else "as asked", shared)
+    if not plan.lit:
+        yield Decision("lighting", "skipped", "no layer needs it")
+
+
+def _explain_subdivision(plan: Plan) -> Decision:
+    if not plan.levels:
+        return Decision("subdivision", "skipped", "no subdivision surface")
+    least, most = plan.levels[0], plan.levels[-1]
+    levels = f"{least} levels" if least == most else f"{least} to {most} levels"
+    reason = "by the surfaces' size in the image" if plan.complexity == "auto" else f"complexity {plan.complexity}"
+    return Decision("subdivision", levels, reason)
+
+
+def _kept(subject: str, kept: bool, why: str, why_not: str) -> Decision:
+    return Decision(subject, "kept" if kept else "skipped", why if kept else why_not)

@@ -1,0 +1,82 @@
+"""The lights that are drawn, their volumes and how far they reach.
+
+Reach of a light. Outside its volume a light may add no more than its share of `light_tolerance` to a pixel, so that
+all that is dropped stays below it. With the far field I/d² and a bound K on BRDF · NoL of the scene's materials,
+
+    reach² = exposure · I_max · K · lights / light_tolerance,    K = 1/π + 1/(2π α³) + clearcoat/(2π αc³)
+
+(GGX: D ≤ 1/(πα²); both visibility terms: V·NoL ≤ 1/(2α); F ≤ 1; the greatest K of the scene's materials). No light
+reaches further than the geometry does.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.scene.light import DistantLight, Light
+from defshade_cli.scene.material import Material
+from defshade_cli.scene.scene import Scene
+from defshade_cli.settings import RenderSettings, Shading
+
+Volume = Literal["quad", "sphere", "cone"]
+
+_MARGIN = 1e-3  # relative slack around bounds that float32 may round outwards
+_MIN_ALPHA = 1e-4  # shaders/lib/constants.glsl
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlannedLight:
+    """reach: radius of the volume in scene units, infinite for a quad."""
+
+    light: Light
+    volume: Volume
+    reach: float
+
+
+def volume_of(light: Light) -> Volume:
+    """Distant and dome lights → quad; a cone of at most 90° → cone; every other light → sphere."""
+    if light.is_infinite:
+        return "quad"
+    return "cone" if light.shaping and light.shaping.cone_angle <= 90.0 else "sphere"
+
+
+def plan_lights(scene: Scene, exposure: float, settings: RenderSettings) -> tuple[PlannedLight, ...]:
+    lit = [light for light in scene.lights if _peak(light) > 0.0]
+    response = max((_greatest_response(m, settings.shading) for m in scene.materials), default=1.0)
+    share = settings.light_tolerance / max(len(lit), 1)
+    order: dict[str, int] = {"quad": 0, "sphere": 1, "cone": 2}
+    planned = [
+        PlannedLight(light, volume_of(light), _reach(light, scene.bounds, exposure * response / share)) for light in lit
+    ]
+    return tuple(sorted(planned, key=lambda p: order[p.volume]))
+
+
+def _greatest_response(material: Material, shading: Shading) -> float:
+    """K of this file's first lines, each lobe with its own α; the classic equation has no coat.
+
+    What an image holds is not known here: it may be the worst.
+    """
+    lobes = [(1.0, 0.0 if "roughness" in material.inputs else material.roughness)]
+    if shading == "preview-surface":
+        amount = 1.0 if "clearcoat" in material.inputs else material.clearcoat
+        lobes.append((amount, 0.0 if "clearcoat_roughness" in material.inputs else material.clearcoat_roughness))
+    return sum(amount / max(roughness**2, _MIN_ALPHA) ** 3 for amount, roughness in lobes) / math.tau + 1.0 / math.pi
+
+
+def _peak(light: Light) -> float:
+    """What a point of the light can send one way: all of L · A, which no profile exceeds."""
+    strength = light.irradiance if isinstance(light, DistantLight) else light.emission * light.power_scale
+    return float(np.max(strength)) * max(light.diffuse, light.specular)
+
+
+def _reach(light: Light, bounds: NDArray[np.float64], gain: float) -> float:
+    if light.is_infinite:
+        return math.inf
+    farthest = np.max(np.abs(bounds - light.position), axis=0)
+    geometry = float(np.linalg.norm(farthest)) * (1.0 + _MARGIN)
+    return min(math.sqrt(_peak(light) * gain), geometry)
