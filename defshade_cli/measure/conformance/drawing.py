@@ -1,0 +1,182 @@
+"""A Case → our picture beside the reference, what differs between them, and the numbers."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.image.files import read
+from defshade_cli.image.film import Film
+from defshade_cli.measure.conformance.catalogue import Case, Conditions
+from defshade_cli.measure.conformance.conditions import under
+from defshade_cli.measure.conformance.silhouette import Mask, intersection_over_union, mask_of_alpha, mask_of_color
+from defshade_cli.passes.pipeline import Pipeline
+from defshade_cli.plan import make_plan
+from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.scene import Scene
+from defshade_cli.settings import RenderSettings
+from defshade_cli.usd.reader import StageReader
+from defshade_cli.usd.stage import open_stage
+
+Picture = NDArray[np.float32]
+
+SAMPLES = {"storm": 64, "usdrecord": 64, "arnold": 64, "viewer": 4, "none": 4}
+MULTISAMPLE = ((0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875))
+"""Where GPUs take the four samples of a pixel, from its upper left corner (Direct3D 11.3 specification, 19.2.4)."""
+
+_LARGEST = 640  # pixels across, of pictures that are only looked at
+_BACKDROP = (0.2, 0.2, 0.2)
+_OURS_ALONE, _THEIRS_ALONE = (1.0, 0.45, 0.0), (0.0, 0.7, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What became of a case.
+
+    iou: of the silhouettes; rmse: of the 8-bit pictures in [0, 1]. None where the reference does not allow it.
+    error: why there is no picture.  unsupported: what of the stage was left out, `path: reason` each.
+    """
+
+    key: str
+    item: str
+    stage: str
+    reference: str
+    maker: str
+    iou: float | None = None
+    rmse: float | None = None
+    note: str = ""
+    error: str = ""
+    unsupported: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawn:
+    """Display-ready pictures (H, W, 3) in [0, 1]; reference and difference are None where there is none."""
+
+    ours: Picture
+    reference: Picture | None
+    difference: Picture | None
+    iou: float | None
+    rmse: float | None
+    unsupported: tuple[str, ...]
+    seconds: dict[str, float]
+
+
+def draw(case: Case, pipeline: Pipeline) -> Drawn:
+    """Raises the errors of errors.py."""
+    reference = read(case.image)["beauty"] if case.image else None
+    start = time.perf_counter()
+    scene = _scene(case, _size(case, reference))
+    read_at = time.perf_counter()
+    pixels = _render(case, pipeline, scene, _size(case, reference))
+    seconds = {"read": read_at - start, "draw": time.perf_counter() - read_at}
+    unsupported = tuple(f"{issue.path}: {issue.reason}" for issue in scene.unsupported)
+    ours = _shown(case, pixels)
+    if reference is None:
+        return Drawn(ours, None, None, None, None, unsupported, seconds)
+    theirs = _reference_shown(case, reference)
+    if case.maker == "viewer":
+        return Drawn(ours, theirs, None, None, None, unsupported, seconds)
+    masks = mask_of_alpha(pixels[..., 3]), _reference_mask(case, reference)
+    rmse = float(np.sqrt(np.mean((ours - theirs) ** 2))) if case.maker in ("storm", "arnold") else None
+    difference = _difference(ours, theirs, *masks)
+    return Drawn(ours, theirs, difference, intersection_over_union(*masks), rmse, unsupported, seconds)
+
+
+def _scene(case: Case, size: tuple[int, int]) -> Scene:
+    conditions = case.conditions
+    reader = StageReader(
+        open_stage(case.stage),
+        camera=conditions.camera,
+        purposes=conditions.purposes,
+        complexity=conditions.complexity,
+        size=size,
+    )
+    frame = reader.first_frame() if conditions.frame == "first" else conditions.frame
+    return under(conditions, reader.read(frame))
+
+
+def _size(case: Case, reference: Picture | None) -> tuple[int, int]:
+    if case.conditions.size or reference is None:
+        return case.conditions.size or (_LARGEST, 480)
+    height, width = reference.shape[:2]
+    scale = min(1.0, _LARGEST / width) if case.maker == "viewer" else 1.0
+    return round(width * scale), round(height * scale)
+
+
+def _render(case: Case, pipeline: Pipeline, scene: Scene, size: tuple[int, int]) -> Picture:
+    """(H, W, 4) scene-linear, premultiplied; Storm's four samples a pixel where their places are known to matter."""
+    is_storm = case.maker == "storm"
+    unlit = case.conditions.lighting == "unlit"
+    layers = ("depth", "albedo") if unlit else ("beauty",)
+    settings = RenderSettings(size=size, layers=layers, shadows=not is_storm, background=not is_storm)
+    plan = make_plan(scene, settings)
+    if case.maker not in ("storm", "usdrecord") or plan.cutout:
+        settings = replace(settings, samples=SAMPLES[case.maker], layers=("beauty",))
+        return pipeline.render(scene, make_plan(scene, settings)).layers["beauty"]
+    scenes = (replace(scene, camera=_moved(plan.camera, size, place)) for place in MULTISAMPLE)
+    films = [pipeline.render(moved, make_plan(moved, settings)) for moved in scenes]
+    return np.mean([_unlit(film) if unlit else film.layers["beauty"] for film in films], axis=0)
+
+
+def _moved(camera: Camera, size: tuple[int, int], place: tuple[float, float]) -> Camera:
+    """Every pixel's centre moved to a place in the pixel."""
+    left, right, bottom, top = camera.window
+    dx, dy = (place[0] - 0.5) * (right - left) / size[0], (0.5 - place[1]) * (top - bottom) / size[1]
+    return replace(camera, window=(left + dx, right + dx, bottom + dy, top + dy))
+
+
+def _unlit(film: Film) -> Picture:
+    """Colours as they are, premultiplied by coverage."""
+    covered = np.isfinite(film.layers["depth"]).astype(np.float32)
+    return np.concatenate([film.layers["albedo"], covered], axis=-1)
+
+
+def _shown(case: Case, pixels: Picture) -> Picture:
+    """As the reference is encoded: Storm's drawing test writes linear light, all others sRGB."""
+    if case.conditions.background is not None:
+        return _quantised(_over(pixels, case.conditions.background))
+    if case.maker == "arnold":
+        return _quantised(_srgb(pixels[..., :3]))
+    return _quantised(_srgb(_over(pixels, _BACKDROP)))
+
+
+def _reference_shown(case: Case, reference: Picture) -> Picture:
+    rgb = reference[..., :3]
+    if case.conditions.background is not None or case.maker == "arnold" or reference.shape[-1] < 4:
+        return rgb
+    return rgb * reference[..., 3:] + _srgb(np.array(_BACKDROP)) * (1.0 - reference[..., 3:])
+
+
+def _reference_mask(case: Case, reference: Picture) -> Mask:
+    background = case.conditions.background
+    return mask_of_alpha(reference[..., 3]) if background is None else mask_of_color(reference[..., :3], background)
+
+
+def _difference(ours: Picture, theirs: Picture, mask: Mask, their_mask: Mask) -> Picture:
+    """Four times as bright as it is, under the pixels that are in one silhouette alone."""
+    shown = np.clip(4.0 * np.abs(ours - theirs), 0.0, 1.0) * 0.6
+    shown[mask & ~their_mask] = _OURS_ALONE
+    shown[their_mask & ~mask] = _THEIRS_ALONE
+    return shown.astype(np.float32)
+
+
+def _over(rgba: Picture, background: tuple[float, float, float]) -> Picture:
+    return rgba[..., :3] + (1.0 - rgba[..., 3:]) * np.array(background, np.float32)
+
+
+def _srgb(linear: NDArray) -> Picture:
+    """IEC 61966-2-1."""
+    x = np.clip(np.nan_to_num(linear), 0.0, 1.0)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055).astype(np.float32)
+
+
+def _quantised(pixels: Picture) -> Picture:
+    """Clamped to 8 bits as Storm does it: floor(255 v + 0.499999)."""
+    return (np.floor(255.0 * np.clip(pixels, 0.0, 1.0) + 0.499999) / 255.0).astype(np.float32)
