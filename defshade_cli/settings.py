@@ -13,6 +13,7 @@ Existing = Literal["overwrite", "skip", "error"]
 Complexity = Literal["auto", "low", "medium", "high", "veryhigh"]
 Payloads = Literal["all", "none"]
 Compression = Literal["zip", "zips", "piz", "dwaa", "none"]
+Bits = Literal[8, 16]
 
 LAYOUTS: tuple[Layout, ...] = ("rgba8", "packed", "float")
 SHADINGS: tuple[Shading, ...] = ("preview-surface", "classic")
@@ -20,6 +21,7 @@ EXISTING: tuple[Existing, ...] = ("overwrite", "skip", "error")
 COMPLEXITIES: tuple[Complexity, ...] = ("auto", "low", "medium", "high", "veryhigh")
 PAYLOADS: tuple[Payloads, ...] = ("all", "none")
 COMPRESSIONS: tuple[Compression, ...] = ("zip", "zips", "piz", "dwaa", "none")
+BITS: tuple[Bits, ...] = (8, 16)
 PURPOSES = ("default", "render", "proxy", "guide")
 
 
@@ -105,6 +107,9 @@ class OutputSettings:
     patterns: file names with frame and name tokens; the suffix picks the format. One file per pattern and frame.
     display, view: of the OCIO config, for display-referred formats; None takes the config's default.
     full_float: 32-bit channels in EXR in place of half (data layers are always 32-bit).
+    multipart: a part of the EXR for each layer.  tiled: EXR in tiles; mipmaps: in tiles with all smaller levels.
+    bits: a channel of a picture; None takes the format's default.  dither: 8-bit colours, against banding.
+    verify: read each file back and compare, before it takes its name.
     """
 
     patterns: tuple[str, ...] = ()
@@ -114,6 +119,12 @@ class OutputSettings:
     full_float: bool = False
     compression: Compression = "zip"
     split_layers: bool = False
+    multipart: bool = False
+    tiled: bool = False
+    mipmaps: bool = False
+    bits: Bits | None = None
+    dither: bool = False
+    verify: bool = False
 
 
 @dataclass(frozen=True, slots=True)

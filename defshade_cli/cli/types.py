@@ -55,6 +55,20 @@ class Frames(click.ParamType):
             self.fail(str(error), param, ctx)
 
 
+class OneOf(click.ParamType):
+    """One of some whole numbers."""
+
+    name = "number"
+
+    def __init__(self, choices: Sequence[int]) -> None:
+        self.choices = tuple(choices)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        if str(value) not in map(str, self.choices):
+            self.fail(f"{value!r} is not {' or '.join(map(str, self.choices))}", param, ctx)
+        return int(value)
+
+
 class Names(click.ParamType):
     """Some of `choices`, separated by commas, each once; `all` for every one."""
 
