@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from defshade_cli.errors import UsageError
+from defshade_cli.settings import VariantChoice
 
 
 class Size(click.ParamType):
@@ -64,6 +65,20 @@ class Frames(click.ParamType):
             self.fail(str(error), param, ctx)
 
 
+class OneOf(click.ParamType):
+    """One of some whole numbers."""
+
+    name = "number"
+
+    def __init__(self, choices: Sequence[int]) -> None:
+        self.choices = tuple(choices)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        if str(value) not in map(str, self.choices):
+            self.fail(f"{value!r} is not {' or '.join(map(str, self.choices))}", param, ctx)
+        return int(value)
+
+
 class Names(click.ParamType):
     """Some of `choices`, separated by commas, each once; `all` for every one."""
 
@@ -82,6 +97,31 @@ class Names(click.ParamType):
             if name not in self.choices:
                 self.fail(f"unknown {self.noun} {name!r}; {_suggestion(name, self.choices)}", param, ctx)
         return tuple(dict.fromkeys(names))
+
+
+class Variant(click.ParamType):
+    """`/Car{color=red}` → VariantChoice."""
+
+    name = "variant"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> VariantChoice:
+        try:
+            return VariantChoice.parse(value)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+class PrimPaths(click.ParamType):
+    """`/World/A,/World/B` → the paths, each once."""
+
+    name = "paths"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
+        paths = value.replace(",", " ").split()
+        for path in paths:
+            if not path.startswith("/"):
+                self.fail(f"{path!r} is no path of a prim, such as /World/Chair", param, ctx)
+        return tuple(dict.fromkeys(paths))
 
 
 class Threshold(click.ParamType):
