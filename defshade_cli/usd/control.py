@@ -59,6 +59,19 @@ def read_control(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode, iss
     return Control(topology, _face_varying(mesh, time, issues))
 
 
+def smooth_control(polygons: Polygons) -> Control | None:
+    """Of a cage without creases, corners or holes; None where the polygons are the surface."""
+    if polygons.scheme == "none":
+        return None
+    topology = Topology(
+        face_counts=polygons.counts,
+        face_indices=polygons.indices,
+        vertex_count=len(polygons.points),
+        scheme=polygons.scheme,
+    )
+    return Control(topology)
+
+
 def _read_topology(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode) -> Topology:
     """Raises ValueError where the arrays contradict each other."""
     return Topology(

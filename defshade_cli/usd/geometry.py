@@ -17,7 +17,7 @@ from pxr import Usd, UsdGeom
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd import flatness
-from defshade_cli.usd.control import CONTROL_ATTRIBUTES, Control, read_control
+from defshade_cli.usd.control import CONTROL_ATTRIBUTES, Control, read_control, smooth_control
 from defshade_cli.usd.copies import Copies
 from defshade_cli.usd.curves import CURVES_ATTRIBUTES, read_curves
 from defshade_cli.usd.gprims import read_solid, size_attributes
@@ -82,17 +82,18 @@ class Gprim:
     issues: tuple[Unsupported, ...]
 
 
-def read_surface(prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
+def read_surface(prim: Usd.Prim, time: Usd.TimeCode, *, as_cages: bool = False) -> Surface | None:
     """The surface of `prim`; None for a type that is no supported surface. Bad data becomes issues, never raises.
 
-    A surface of which nothing can be drawn has no groups, and issues that say why.
+    A surface of which nothing can be drawn has no groups, and issues that say why. as_cages: see gprims.read_solid.
     """
     issues: list[str] = []
     path = str(prim.GetPath())
-    polygons, copies = _read_shape(prim, time, issues)
+    polygons, copies = _read_shape(prim, time, issues, as_cages)
     if polygons is None:
         return None
-    control = read_control(UsdGeom.Mesh(prim), polygons, time, issues) if prim.IsA(UsdGeom.Mesh) else None
+    is_mesh = prim.IsA(UsdGeom.Mesh)
+    control = read_control(UsdGeom.Mesh(prim), polygons, time, issues) if is_mesh else smooth_control(polygons)
     faces = read_faces(prim, time, issues)
     opacity = _constant(polygons.display_opacity)
     return Surface(
@@ -134,7 +135,9 @@ def is_time_varying(prim: Usd.Prim) -> bool:
     return any(source.ValueMightBeTimeVarying() for source in sources if source)
 
 
-def _read_shape(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> tuple[Polygons | None, Copies | None]:
+def _read_shape(
+    prim: Usd.Prim, time: Usd.TimeCode, issues: list[str], as_cages: bool
+) -> tuple[Polygons | None, Copies | None]:
     if prim.IsA(UsdGeom.Mesh):
         return read_mesh(UsdGeom.Mesh(prim), time, issues), None
     if prim.IsA(UsdGeom.Points):
@@ -143,7 +146,7 @@ def _read_shape(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> tuple[
         return read_curves(UsdGeom.BasisCurves(prim), time, issues), None
     if prim.IsA(UsdGeom.NurbsPatch):
         return read_patch(UsdGeom.NurbsPatch(prim), time, issues), None
-    return read_solid(prim, time, issues), None
+    return read_solid(prim, time, issues, as_cage=as_cages), None
 
 
 def _attributes(prim: Usd.Prim) -> tuple[str, ...]:

@@ -15,13 +15,13 @@ from defshade_cli.usd.material import ReadMaterial, read_material
 class Memory:
     """The unchanging parts of one stage, and the names of what stands in its prototypes.
 
-    kinds: of prims.  xforms: USD's cache, which drops only what varies when its time is set.
+    as_cages: see gprims.read_solid.  kinds: of prims.  xforms: USD's cache, which drops only what varies when its time is set.
     """
 
-    def __init__(self, stage: Usd.Stage) -> None:
+    def __init__(self, stage: Usd.Stage, *, as_cages: bool = False) -> None:
         self.kinds = Kinds()
         self.xforms = UsdGeom.XformCache()
-        self._stage = stage
+        self._stage, self._as_cages = stage, as_cages
         self._surfaces: dict[Sdf.Path, tuple[Usd.TimeCode, Surface | None]] = {}
         self._time_varying: dict[Sdf.Path, bool] = {}
         self._bindings: dict[Sdf.Path, Bindings] = {}
@@ -35,7 +35,7 @@ class Memory:
             time_read, surface = self._surfaces[path]
             if time == time_read or not self._is_time_varying(prim):
                 return surface
-        surface = self._as_shown(read_surface(prim, time), path)
+        surface = self._as_shown(read_surface(prim, time, as_cages=self._as_cages), path)
         self._surfaces[path] = time, surface
         return surface
 

@@ -19,6 +19,7 @@ from defshade_cli.settings import Complexity
 from defshade_cli.usd import stage as facts
 from defshade_cli.usd.camera import choose_camera, find_cameras, framed_camera, read_camera
 from defshade_cli.usd.complexity import View, choose_levels
+from defshade_cli.usd.extent import extent_of
 from defshade_cli.usd.geometry import Gprim, Surface
 from defshade_cli.usd.instancing import Piece
 from defshade_cli.usd.light import camera_light
@@ -38,7 +39,8 @@ class StageReader:
     """Reads frames of one stage. What does not change over time is read once, and stays the same object.
 
     camera: path or name; without it the rule of usd/camera.py picks.  purposes: of the geometry that is drawn.
-    complexity: of subdivision surfaces; for `auto` it matters how large the image is, see scene.camera.image_size.
+    complexity: of subdivision surfaces and, where it is not `auto`, of solids as Hydra makes cages of them; for `auto`
+        it matters how large the image is, see scene.camera.image_size.
     Raises PrimNotFound for a camera that the stage lacks.
     """
 
@@ -54,7 +56,7 @@ class StageReader:
     ) -> None:
         self._stage, self._purposes = stage, tuple(purposes)
         self._complexity, self._size, self._width = complexity, size, width
-        self._memory = Memory(stage)
+        self._memory = Memory(stage, as_cages=complexity != "auto")
         self._tessellation = Tessellation()
         self._settings = read_settings(stage)
         self._cameras = find_cameras(stage)
@@ -116,7 +118,7 @@ class StageReader:
     ) -> tuple[Camera, tuple[Unsupported, ...]]:
         """The camera; one of ours frames the surfaces as authored, however they are refined."""
         if self._camera is None:
-            boxes = (world_boxes(surface.polygons.bounds, piece.root_from_object) for piece, surface in drawn)
+            boxes = (world_boxes(extent_of(self._stage, surface, time), piece.root_from_object) for piece, surface in drawn)
             return framed_camera(enclose(boxes), facts.up_axis(self._stage)), ()
         camera, issues = read_camera(self._camera, time)
         return self._settings.applied_to(camera), issues

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from defshade_cli.errors import UsageError
 from defshade_cli.settings import Complexity
+from defshade_cli.spaces import ConformPolicy
 
 Maker = Literal["storm", "usdrecord", "arnold", "viewer", "none"]
 """Who made a reference: OpenUSD's drawing test, usdrecord, Arnold's kick, some viewer under conditions unknown."""
@@ -34,6 +35,7 @@ class Conditions:
     camera: prim path; None and no `eye`: the rule of usd/camera.py.
     eye: world-space place of a camera of ours with a vertical field of view of 60°, which looks along −Z, or along +Y
         where Z is up; `look` says which.
+    conform: how the camera's window is fitted to the image, where the stage does not say so.
     crop: (left, top, right, bottom), the part of that camera's image that is shown, each 0..1.
     clip_planes: (a, b, c, d) each, in camera space, as UsdGeomCamera has them.
     light: vector towards a white distant light of irradiance 1, world space.
@@ -45,6 +47,7 @@ class Conditions:
     camera: str | None = None
     eye: tuple[float, float, float] | None = None
     look: Literal["-Z", "+Y"] = "-Z"
+    conform: ConformPolicy | None = None
     crop: Rectangle = (0.0, 0.0, 1.0, 1.0)
     clip_planes: tuple[Rectangle, ...] = ()
     complexity: Complexity = "auto"
@@ -119,6 +122,7 @@ def _storm(reference: Mapping[str, Any], command: str) -> Conditions:
         camera=reference.get("camera"),
         eye=tuple(eye) if eye else None,
         look="+Y" if reference.get("look", "").startswith("+Y") else "-Z",
+        conform="adjustApertureWidth",
         crop=_crop(options),
         clip_planes=tuple(tuple(map(float, plane)) for plane in options.get("clipPlane", ())),
         complexity=_COMPLEXITIES[_complexity(reference, options)],
@@ -180,7 +184,7 @@ def _arnold(reference: Mapping[str, Any], command: str) -> Conditions:
     options = _options(command)
     width, height = options["r"][-1]
     frame = float(options["frame"][-1][0]) if "frame" in options else 1.0
-    return Conditions(size=(int(width), int(height)), frame=frame)
+    return Conditions(size=(int(width), int(height)), frame=frame, conform="adjustApertureHeight")
 
 
 def _viewer(reference: Mapping[str, Any], command: str) -> Conditions:

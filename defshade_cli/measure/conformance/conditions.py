@@ -21,9 +21,11 @@ _MATTE = replace(UNBOUND, use_specular_workflow=True, roughness=1.0)
 
 def under(conditions: Conditions, scene: Scene) -> Scene:
     """The scene as the reference saw it."""
+    if conditions.conform is not None:
+        scene = replace(scene, conform=conditions.conform)
     if conditions.background is None:
         return scene
-    scene = replace(scene, camera=_camera(conditions, scene), pixel_aspect=1.0, conform="adjustApertureWidth")
+    scene = replace(scene, camera=_camera(conditions, scene), pixel_aspect=1.0)
     if conditions.lighting == "distant":
         authored = tuple(light for light in scene.lights if not light.path.startswith("<"))
         scene = replace(scene, lights=(*authored, _distant(conditions.light)))
@@ -40,7 +42,7 @@ def _camera(conditions: Conditions, scene: Scene) -> Camera:
     camera = scene.camera if conditions.eye is None else _looking(conditions)
     assert conditions.size is not None
     aspect = conditions.size[0] / conditions.size[1]
-    window = _cropped(conform_window(camera.window, aspect, "adjustApertureWidth"), conditions.crop)
+    window = _cropped(conform_window(camera.window, aspect, scene.conform), conditions.crop)
     bare = all(material.path == UNBOUND.path for material in scene.materials)
     return replace(camera, window=window, exposure=math.pi if bare else 1.0, f_stop=0.0)
 

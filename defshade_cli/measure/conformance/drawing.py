@@ -9,11 +9,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.image.files import read
+from defshade_cli.image.reading import read
 from defshade_cli.image.film import Film
 from defshade_cli.measure.conformance.catalogue import Case, Conditions
 from defshade_cli.measure.conformance.conditions import under
-from defshade_cli.measure.conformance.silhouette import Mask, intersection_over_union, mask_of_alpha, mask_of_color
+from defshade_cli.measure.conformance.silhouette import (
+    ANY_SAMPLE,
+    HALF,
+    Mask,
+    even_background,
+    intersection_over_union,
+    mask_of_alpha,
+    mask_of_color,
+)
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.camera import Camera
@@ -25,8 +33,8 @@ from defshade_cli.usd.stage import open_stage
 Picture = NDArray[np.float32]
 
 SAMPLES = {"storm": 64, "usdrecord": 64, "arnold": 64, "viewer": 4, "none": 4}
-MULTISAMPLE = ((0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875))
-"""Where GPUs take the four samples of a pixel, from its upper left corner (Direct3D 11.3 specification, 19.2.4)."""
+MULTISAMPLE = ((0.375, 0.875), (0.875, 0.625), (0.125, 0.375), (0.625, 0.125))
+"""Where OpenGL takes the four samples of a pixel, from its upper left corner: Direct3D's places upside down."""
 
 _LARGEST = 640  # pixels across, of pictures that are only looked at
 _BACKDROP = (0.2, 0.2, 0.2)
@@ -83,7 +91,9 @@ def draw(case: Case, pipeline: Pipeline) -> Drawn:
     theirs = _reference_shown(case, reference)
     if case.maker == "viewer":
         return Drawn(ours, theirs, None, None, None, unsupported, seconds)
-    masks = mask_of_alpha(pixels[..., 3]), _reference_mask(case, reference)
+    masks = _masks(case, pixels, reference)
+    if masks is None:
+        return Drawn(ours, theirs, None, None, None, unsupported, seconds)
     rmse = float(np.sqrt(np.mean((ours - theirs) ** 2))) if case.maker in ("storm", "arnold") else None
     difference = _difference(ours, theirs, *masks)
     return Drawn(ours, theirs, difference, intersection_over_union(*masks), rmse, unsupported, seconds)
@@ -154,9 +164,14 @@ def _reference_shown(case: Case, reference: Picture) -> Picture:
     return rgb * reference[..., 3:] + _srgb(np.array(_BACKDROP)) * (1.0 - reference[..., 3:])
 
 
-def _reference_mask(case: Case, reference: Picture) -> Mask:
-    background = case.conditions.background
-    return mask_of_alpha(reference[..., 3]) if background is None else mask_of_color(reference[..., :3], background)
+def _masks(case: Case, pixels: Picture, reference: Picture) -> tuple[Mask, Mask] | None:
+    """Our silhouette and the reference's; None where the reference has none to read off."""
+    threshold = HALF if case.maker == "arnold" else ANY_SAMPLE
+    ours = mask_of_alpha(pixels[..., 3], threshold)
+    if case.maker != "storm":
+        return ours, mask_of_alpha(reference[..., 3], threshold)
+    background = even_background(reference[..., :3])
+    return None if background is None else (ours, mask_of_color(reference[..., :3], background))
 
 
 def _difference(ours: Picture, theirs: Picture, mask: Mask, their_mask: Mask) -> Picture:

@@ -1,0 +1,27 @@
+"""The room that a surface takes by USD's own account, which is what usdrecord frames."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+from defshade_cli.usd.geometry import Surface
+from defshade_cli.usd.values import floats
+
+
+def extent_of(stage: Usd.Stage, surface: Surface, time: Usd.TimeCode) -> NDArray[np.float64]:
+    """(2, 3) least and greatest corner in object space: the authored extent, else USD's computation.
+
+    The polygons' own where USD gives neither, and of each of a surface's copies.
+    """
+    prim = stage.GetPrimAtPath(surface.path)
+    if surface.copies is not None or not prim:
+        return surface.polygons.bounds
+    attribute = UsdGeom.Boundable(prim).GetExtentAttr()
+    authored = attribute.Get(time) if attribute.HasAuthoredValue() else None
+    value = authored or UsdGeom.Boundable.ComputeExtentFromPlugins(UsdGeom.Boundable(prim), time)
+    box = None if value is None else floats(value, 3)
+    if box is None or box.shape != (2, 3) or not np.isfinite(box).all() or (box[0] > box[1]).any():
+        return surface.polygons.bounds
+    return box.astype(np.float64)
