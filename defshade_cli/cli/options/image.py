@@ -9,8 +9,7 @@ import click
 
 from defshade_cli import settings
 from defshade_cli.cli.options.option import Function, Option
-from defshade_cli.cli.types import Finite, Names, Size
-from defshade_cli.image.layers import LAYERS
+from defshade_cli.cli.types import Finite, Layers, Size
 from defshade_cli.settings import RenderSettings
 
 _RENDER = RenderSettings()
@@ -43,11 +42,12 @@ def image_options(layers: Sequence[str]) -> list[Function]:
         ),
         option(
             "--layers",
-            type=Names("layer", tuple(LAYERS)),
+            type=Layers(),
             metavar="NAMES",
             default=tuple(layers),
             default_text=",".join(layers),
-            help="Layers to write, with commas between, of those listed below; or 'all'.",
+            help="Layers to write, with commas between, of those listed below or by their names in Hydra, "
+            "Arnold and Blender; 'all' for all that are listed.",
         ),
         *_shading_options(),
     ]
