@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from defshade_cli.errors import UsageError
+from defshade_cli.settings import VariantChoice
 
 
 class Size(click.ParamType):
@@ -54,6 +55,20 @@ class Frames(click.ParamType):
             self.fail(str(error), param, ctx)
 
 
+class OneOf(click.ParamType):
+    """One of some whole numbers."""
+
+    name = "number"
+
+    def __init__(self, choices: Sequence[int]) -> None:
+        self.choices = tuple(choices)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        if str(value) not in map(str, self.choices):
+            self.fail(f"{value!r} is not {' or '.join(map(str, self.choices))}", param, ctx)
+        return int(value)
+
+
 class Names(click.ParamType):
     """Some of `choices`, separated by commas, each once; `all` for every one."""
 
@@ -87,6 +102,31 @@ class Layers(click.ParamType):
             return resolve(names)
         except UsageError as error:
             self.fail(str(error), param, ctx)
+
+
+class Variant(click.ParamType):
+    """`/Car{color=red}` → VariantChoice."""
+
+    name = "variant"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> VariantChoice:
+        try:
+            return VariantChoice.parse(value)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+class PrimPaths(click.ParamType):
+    """`/World/A,/World/B` → the paths, each once."""
+
+    name = "paths"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
+        paths = value.replace(",", " ").split()
+        for path in paths:
+            if not path.startswith("/"):
+                self.fail(f"{path!r} is no path of a prim, such as /World/Chair", param, ctx)
+        return tuple(dict.fromkeys(paths))
 
 
 class Threshold(click.ParamType):

@@ -9,6 +9,9 @@ SampledSource = Literal["lighting", "coverage"]
 """Sources that are summed over samples; any other is a plane of the data GBuffer."""
 
 BEAUTY = "beauty"
+MAIN_PART = "rgba"
+"""The part of a multi-part EXR that holds the beauty, as Nuke names it."""
+
 SCENE_LINEAR, SCENE_UNITS, UNIT_VECTOR = "scene-linear", "scene units", "unit vector"
 
 
