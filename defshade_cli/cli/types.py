@@ -41,6 +41,16 @@ class Finite(click.ParamType):
         return number
 
 
+class Positive(Finite):
+    """A finite float above 0."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        number = super().convert(value, param, ctx)
+        if number <= 0.0:
+            self.fail(f"{value!r} is not above 0", param, ctx)
+        return number
+
+
 class Frames(click.ParamType):
     """`1:10x2,15` → time codes; the syntax is farm.frames'."""
 

@@ -15,7 +15,7 @@ from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
-from defshade_cli.settings import Complexity, Layout, RenderSettings, Shading
+from defshade_cli.settings import FILTERS, Complexity, Filter, Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
 from defshade_cli.units import exposure_scale
 
@@ -28,6 +28,7 @@ class Plan:
 
     camera: conformed to the image.  clip: (near, far), the camera's range tightened to the geometry.
     exposure: linear, the camera's and the settings' together.
+    filter_width: pixels.
     planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
     lights: sorted quads, spheres, cones.
     shadows: some light casts them.  background: domes are seen where no geometry is.
@@ -43,6 +44,8 @@ class Plan:
     layout: Layout
     shading: Shading
     samples: int
+    filter: Filter
+    filter_width: float
     layers: tuple[str, ...]
     planes: tuple[Plane, ...]
     data_planes: tuple[Plane, ...]
@@ -115,6 +118,8 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         layout=settings.layout,
         shading=settings.shading,
         samples=settings.samples,
+        filter=settings.filter,
+        filter_width=settings.filter_width or FILTERS[settings.filter],
         layers=layers,
         planes=planes,
         data_planes=data_planes,

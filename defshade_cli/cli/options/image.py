@@ -9,6 +9,7 @@ import click
 
 from defshade_cli import settings
 from defshade_cli.cli.options.option import Function, Option
+from defshade_cli.cli.options.sampling import sampling_options
 from defshade_cli.cli.types import Finite, Layers, Size
 from defshade_cli.settings import RenderSettings
 
@@ -32,15 +33,6 @@ def image_options(layers: Sequence[str]) -> list[Function]:
             help="Width in pixels; the height follows the camera's aspect.",
         ),
         option(
-            "--samples",
-            type=click.IntRange(min=1),
-            default=_RENDER.samples,
-            default_text=str(_RENDER.samples),
-            metavar="N",
-            help="Samples a pixel of the beauty: places in the pixel, on the lens and on every light. One sample takes "
-            "lights for points. Data layers are one sample at the pixel's centre.",
-        ),
-        option(
             "--layers",
             type=Layers(),
             metavar="NAMES",
@@ -49,6 +41,7 @@ def image_options(layers: Sequence[str]) -> list[Function]:
             help="Layers to write, with commas between, of those listed below or by their names in Hydra, "
             "Arnold and Blender; 'all' for all that are listed.",
         ),
+        *sampling_options(),
         *_shading_options(),
     ]
 
