@@ -99,7 +99,7 @@ class StageReader:
             lights=tuple(_lights(pieces)),
             camera=camera,
             cameras=self._cameras,
-            unsupported=(*traversal.issues, *mended, *palette.issues, *camera_issues, *self._settings.issues),
+            unsupported=(*traversal.issues, *mended, *palette.issues, *camera_issues),
             meters_per_unit=facts.meters_per_unit(self._stage),
             up_axis=facts.up_axis(self._stage),
             frame=frame,
@@ -107,6 +107,7 @@ class StageReader:
             resolution=self._settings.resolution,
             pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
+            data_window=self._settings.data_window,
         )
 
     def _read_camera(
