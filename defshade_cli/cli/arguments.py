@@ -8,14 +8,19 @@ from typing import Any
 
 import click
 
+<<<<<<< HEAD
 from defshade_cli.cli.types import Crop, Size
 from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
+=======
+from defshade_cli.cli.types import Size
+from defshade_cli.settings import Composition, OutputSettings, RenderJob, RenderSettings
+>>>>>>> main
 
-_NOT_OPTIONS = {"stage", "frames", "settings", "output", "patterns"}
+_NOT_OPTIONS = {"stage", "frames", "composition", "session_layers", "settings", "output", "patterns"}
 
 
 def option_arguments(job: RenderJob, params: Iterable[click.Parameter]) -> list[str]:
-    """What to type for all of the job that is not the default: stage, frames and output files apart.
+    """What to type for all of the job that is not the default: stage, session layers, frames and output files apart.
 
     params: of the command, the options among them.
     """
@@ -26,7 +31,12 @@ def option_arguments(job: RenderJob, params: Iterable[click.Parameter]) -> list[
 
 def _chosen(job: RenderJob) -> Iterator[tuple[str, Any]]:
     """Names and values of the fields that differ from their defaults."""
-    defaults = ((job, RenderJob(job.stage)), (job.settings, RenderSettings()), (job.output, OutputSettings()))
+    defaults = (
+        (job, RenderJob(job.stage)),
+        (job.composition, Composition()),
+        (job.settings, RenderSettings()),
+        (job.output, OutputSettings()),
+    )
     for owner, default in defaults:
         for field in fields(owner):
             value = getattr(owner, field.name)

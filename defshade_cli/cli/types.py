@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from defshade_cli.errors import UsageError
+from defshade_cli.settings import VariantChoice
 
 Region = tuple[int, int, int, int]
 """(x, y, width, height) in pixels."""
@@ -63,6 +64,16 @@ class Finite(click.ParamType):
         return number
 
 
+class Positive(Finite):
+    """A finite float above 0."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        number = super().convert(value, param, ctx)
+        if number <= 0.0:
+            self.fail(f"{value!r} is not above 0", param, ctx)
+        return number
+
+
 class Frames(click.ParamType):
     """`1:10x2,15` → time codes; the syntax is farm.frames'."""
 
@@ -109,6 +120,31 @@ class Names(click.ParamType):
             if name not in self.choices:
                 self.fail(f"unknown {self.noun} {name!r}; {_suggestion(name, self.choices)}", param, ctx)
         return tuple(dict.fromkeys(names))
+
+
+class Variant(click.ParamType):
+    """`/Car{color=red}` → VariantChoice."""
+
+    name = "variant"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> VariantChoice:
+        try:
+            return VariantChoice.parse(value)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+class PrimPaths(click.ParamType):
+    """`/World/A,/World/B` → the paths, each once."""
+
+    name = "paths"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
+        paths = value.replace(",", " ").split()
+        for path in paths:
+            if not path.startswith("/"):
+                self.fail(f"{path!r} is no path of a prim, such as /World/Chair", param, ctx)
+        return tuple(dict.fromkeys(paths))
 
 
 class Threshold(click.ParamType):

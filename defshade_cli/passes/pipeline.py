@@ -75,7 +75,7 @@ class Pipeline:
         radiance = self._frame.radiance("sample", plan.size, gbuffer)
         total = self._frame.radiance("total", plan.size) if plan.samples > 1 else radiance
         total.framebuffer.clear()
-        for sample in samples(plan.samples):
+        for sample in samples(plan.samples, plan.filter, plan.filter_width):
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             self._light(draws, scene, plan, sample, gbuffer, radiance)
             if plan.samples > 1:

@@ -16,8 +16,12 @@ from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
+<<<<<<< HEAD
 from defshade_cli.scene.window import DataWindow, from_ndc
 from defshade_cli.settings import Complexity, Layout, RenderSettings, Shading
+=======
+from defshade_cli.settings import FILTERS, Complexity, Filter, Layout, RenderSettings, Shading
+>>>>>>> main
 from defshade_cli.spaces import transform_points
 from defshade_cli.units import exposure_scale
 
@@ -32,6 +36,7 @@ class Plan:
     window: the part of it that is rendered; size and camera are its own.
     clip: (near, far), the camera's range tightened to the geometry.
     exposure: linear, the camera's and the settings' together.
+    filter_width: pixels.
     planes: of the GBuffer; lights: sorted quads, spheres, cones.
     shadows: some light casts them.  background: domes are seen where no geometry is.
     cutout: some opacity may be below 1.  textures: some material reads them.
@@ -48,6 +53,8 @@ class Plan:
     layout: Layout
     shading: Shading
     samples: int
+    filter: Filter
+    filter_width: float
     layers: tuple[str, ...]
     planes: tuple[Plane, ...]
     lights: tuple[PlannedLight, ...]
@@ -117,6 +124,8 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         layout=settings.layout,
         shading=settings.shading,
         samples=settings.samples,
+        filter=settings.filter,
+        filter_width=settings.filter_width or FILTERS[settings.filter],
         layers=settings.layers,
         planes=planes,
         lights=lights,

@@ -9,7 +9,12 @@ import click
 
 from defshade_cli import settings
 from defshade_cli.cli.options.option import Function, Option
+<<<<<<< HEAD
 from defshade_cli.cli.types import Crop, Finite, Names, Size
+=======
+from defshade_cli.cli.options.sampling import sampling_options
+from defshade_cli.cli.types import Finite, Names, Size
+>>>>>>> main
 from defshade_cli.image.layers import LAYERS
 from defshade_cli.settings import RenderSettings
 
@@ -33,6 +38,7 @@ def image_options(layers: Sequence[str]) -> list[Function]:
             help="Width in pixels; the height follows the camera's aspect.",
         ),
         option(
+<<<<<<< HEAD
             "--crop",
             type=Crop(),
             metavar="WxH+X+Y",
@@ -49,6 +55,8 @@ def image_options(layers: Sequence[str]) -> list[Function]:
             "lights for points. Data layers are one sample at the pixel's centre.",
         ),
         option(
+=======
+>>>>>>> main
             "--layers",
             type=Names("layer", tuple(LAYERS)),
             metavar="NAMES",
@@ -56,6 +64,7 @@ def image_options(layers: Sequence[str]) -> list[Function]:
             default_text=",".join(layers),
             help="Layers to write, with commas between, of those listed below; or 'all'.",
         ),
+        *sampling_options(),
         *_shading_options(),
     ]
 
