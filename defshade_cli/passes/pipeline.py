@@ -57,7 +57,9 @@ class Pipeline:
             layers |= data_layers(self._data_planes(draws, plan), plan)
         return Film(
             layers={name: layers[name] for name in plan.layers},
-            camera=plan.camera,
+            camera=plan.display_camera,
+            origin=plan.window.origin,
+            display=plan.display,
             scene_name=scene.name,
             frame=scene.frame,
             frames_per_second=scene.frames_per_second,

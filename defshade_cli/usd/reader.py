@@ -112,6 +112,7 @@ class StageReader:
             resolution=self._settings.resolution,
             pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
+            data_window=self._settings.data_window,
         )
 
     def _read_camera(

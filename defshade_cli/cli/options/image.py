@@ -10,7 +10,7 @@ import click
 from defshade_cli import settings
 from defshade_cli.cli.options.option import Function, Option
 from defshade_cli.cli.options.sampling import sampling_options
-from defshade_cli.cli.types import Finite, Layers, Size
+from defshade_cli.cli.types import Crop, Finite, Layers, Size
 from defshade_cli.settings import RenderSettings
 
 _RENDER = RenderSettings()
@@ -31,6 +31,13 @@ def image_options(layers: Sequence[str]) -> list[Function]:
             type=click.IntRange(min=1),
             metavar="PIXELS",
             help="Width in pixels; the height follows the camera's aspect.",
+        ),
+        option(
+            "--crop",
+            type=Crop(),
+            metavar="WxH+X+Y",
+            help="Part of the image to render: WxH pixels from X, Y on, from the top left; what lies beyond the image "
+            "is overscan. The default is the stage's data window.",
         ),
         option(
             "--layers",
