@@ -8,13 +8,8 @@ from typing import Any
 
 import click
 
-<<<<<<< HEAD
 from defshade_cli.cli.types import Crop, Size
-from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
-=======
-from defshade_cli.cli.types import Size
 from defshade_cli.settings import Composition, OutputSettings, RenderJob, RenderSettings
->>>>>>> main
 
 _NOT_OPTIONS = {"stage", "frames", "composition", "session_layers", "settings", "output", "patterns"}
 

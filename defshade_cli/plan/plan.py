@@ -16,12 +16,8 @@ from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
-<<<<<<< HEAD
 from defshade_cli.scene.window import DataWindow, from_ndc
-from defshade_cli.settings import Complexity, Layout, RenderSettings, Shading
-=======
 from defshade_cli.settings import FILTERS, Complexity, Filter, Layout, RenderSettings, Shading
->>>>>>> main
 from defshade_cli.spaces import transform_points
 from defshade_cli.units import exposure_scale
 

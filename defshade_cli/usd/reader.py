@@ -58,7 +58,7 @@ class StageReader:
         self._tessellation = Tessellation()
         self._settings = read_settings(stage)
         self._cameras = find_cameras(stage)
-        self._issues = (*(arc.unsupported for arc in find_unresolved(stage)), *self._settings.issues)
+        self._issues = tuple(arc.unsupported for arc in find_unresolved(stage))
         self._camera = choose_camera(stage, self._cameras, camera, self._settings.camera)
 
     @property
@@ -101,11 +101,7 @@ class StageReader:
             lights=tuple(_lights(pieces)),
             camera=camera,
             cameras=self._cameras,
-<<<<<<< HEAD
-            unsupported=(*traversal.issues, *mended, *palette.issues, *camera_issues),
-=======
             unsupported=(*self._issues, *traversal.issues, *mended, *palette.issues, *camera_issues),
->>>>>>> main
             meters_per_unit=facts.meters_per_unit(self._stage),
             up_axis=facts.up_axis(self._stage),
             frame=frame,

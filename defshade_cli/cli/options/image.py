@@ -9,12 +9,8 @@ import click
 
 from defshade_cli import settings
 from defshade_cli.cli.options.option import Function, Option
-<<<<<<< HEAD
-from defshade_cli.cli.types import Crop, Finite, Names, Size
-=======
 from defshade_cli.cli.options.sampling import sampling_options
-from defshade_cli.cli.types import Finite, Names, Size
->>>>>>> main
+from defshade_cli.cli.types import Crop, Finite, Names, Size
 from defshade_cli.image.layers import LAYERS
 from defshade_cli.settings import RenderSettings
 
@@ -38,7 +34,6 @@ def image_options(layers: Sequence[str]) -> list[Function]:
             help="Width in pixels; the height follows the camera's aspect.",
         ),
         option(
-<<<<<<< HEAD
             "--crop",
             type=Crop(),
             metavar="WxH+X+Y",
@@ -46,17 +41,6 @@ def image_options(layers: Sequence[str]) -> list[Function]:
             "is overscan. The default is the stage's data window.",
         ),
         option(
-            "--samples",
-            type=click.IntRange(min=1),
-            default=_RENDER.samples,
-            default_text=str(_RENDER.samples),
-            metavar="N",
-            help="Samples a pixel of the beauty: places in the pixel, on the lens and on every light. One sample takes "
-            "lights for points. Data layers are one sample at the pixel's centre.",
-        ),
-        option(
-=======
->>>>>>> main
             "--layers",
             type=Names("layer", tuple(LAYERS)),
             metavar="NAMES",
