@@ -81,6 +81,8 @@ class RenderSettings:
 
     size: (width, height) in pixels; None follows the stage's RenderSettings, then 1920x1080.
     width: pixels; the height then follows the camera's aspect. At most one of size and width is given.
+    crop: (x, y, width, height) of the pixels that are rendered, from the image's top left corner, which they may leave;
+        None follows the stage's RenderSettings, then the whole image.
     samples: jittered samples a pixel; 1 is a sample at the pixel's centre.
     filter: the samples of a pixel fall by it.  filter_width: pixels from end to end; None for the filter's own.
     exposure: stops added to the camera's own.
@@ -92,6 +94,7 @@ class RenderSettings:
 
     size: tuple[int, int] | None = None
     width: int | None = None
+    crop: tuple[int, int, int, int] | None = None
     samples: int = 1
     filter: Filter = "box"
     filter_width: float | None = None

@@ -10,15 +10,26 @@ in vec4 vertex_color;          // alpha is opacity; negative: the instance's val
 #ifdef TEXTURES
 in vec4 vertex_uv;             // two sets
 #endif
+#ifdef LAYER_UV
+in vec2 vertex_layer_uv;
+out vec2 layer_uv;
+#endif
 in uvec2 draw;                 // instance, material
+
+#ifdef CLIPPING_PLANES
+uniform vec4 clipping_planes[CLIPPING_PLANES]; // over relative positions; what is below 0 goes
+out float gl_ClipDistance[CLIPPING_PLANES];
+#endif
 
 out vec3 normal_relative;
 out vec4 display_color;
 flat out uint material_index;
 flat out uint instance_index;
 flat out float handedness;
-#ifdef TEXTURES
+#ifdef POSITION
 out vec3 position_relative;
+#endif
+#ifdef TEXTURES
 out vec4 uv;
 #endif
 
@@ -34,9 +45,17 @@ void main() {
     instance_index = draw.x;
     material_index = draw.y;
     handedness = instance.handedness;
-#ifdef TEXTURES
+#ifdef POSITION
     position_relative = position.xyz;
+#endif
+#ifdef TEXTURES
     uv = vertex_uv;
 #endif
+#ifdef LAYER_UV
+    layer_uv = vertex_layer_uv;
+#endif
     gl_Position = view.clip_from_relative * vec4(position.xyz, 1.0);
+#ifdef CLIPPING_PLANES
+    for (int i = 0; i < CLIPPING_PLANES; ++i) gl_ClipDistance[i] = dot(clipping_planes[i], vec4(position.xyz, 1.0));
+#endif
 }

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import moderngl
+import numpy as np
+from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import Plane, uses_standard_depth, write_source
@@ -12,6 +16,9 @@ from defshade_cli.gpu.residence import DrawList
 from defshade_cli.gpu.targets import Target, allocate
 from defshade_cli.gpu.textures import textures_source
 from defshade_cli.settings import Layout
+
+_CLIP_DISTANCE = 0x3000
+"""GL_CLIP_DISTANCE0: moderngl has no name for it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,6 +50,7 @@ class GBufferVariant:
     """What the pass is compiled for.
 
     cutout: some opacity is below 1; color_varies: displayColor a vertex; texture_groups: 0 without textures.
+    clipping_planes: how many cut the geometry.
     """
 
     planes: tuple[Plane, ...]
@@ -50,12 +58,15 @@ class GBufferVariant:
     cutout: bool
     color_varies: bool
     texture_groups: int = 0
+    clipping_planes: int = 0
 
     @property
     def defines(self) -> list[str]:
         flags = ["CUTOUT"] * self.cutout + ["DISPLAY_COLOR_VARIES"] * self.color_varies
-        flags += ["TEXTURES"] * bool(self.texture_groups)
-        return [plane.define for plane in self.planes] + flags
+        flags += ["TEXTURES", "POSITION"] * bool(self.texture_groups)
+        flags += [f"CLIPPING_PLANES {self.clipping_planes}"] * bool(self.clipping_planes)
+        inputs = [name for plane in self.planes for name in plane.inputs]
+        return list(dict.fromkeys([plane.define for plane in self.planes] + flags + inputs))
 
 
 class GBufferPass:
@@ -71,8 +82,11 @@ class GBufferPass:
             "gbuffer.vert", "gbuffer.frag", defines=variant.defines, generated=generated
         )
 
-    def draw(self, draws: DrawList, gbuffer: GBuffer) -> None:
-        """All of `draws` with the bound View, one multi-draw; both sides of every face."""
+    def draw(self, draws: DrawList, gbuffer: GBuffer, clipping_planes: NDArray[np.float64]) -> None:
+        """All of `draws` with the bound View, one multi-draw; both sides of every face.
+
+        clipping_planes: (N, 4) in relative space, as many as the variant has.
+        """
         standard = uses_standard_depth(gbuffer.layout)
         framebuffer = gbuffer.target.framebuffer
         framebuffer.use()
@@ -80,6 +94,18 @@ class GBufferPass:
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = "<" if standard else ">"
         draws.textures.bind(self._program)
-        vertex_array = self._context.vertex_array(self._program, list(draws.vertices), draws.indices)
-        vertex_array.render_indirect(draws.commands)
+        vertex_array = self._context.vertex_array(self._program, draws.vertices_of(self._program), draws.indices)
+        with self._clipped(clipping_planes):
+            vertex_array.render_indirect(draws.commands)
         vertex_array.release()
+
+    @contextmanager
+    def _clipped(self, planes: NDArray[np.float64]) -> Iterator[None]:
+        """Only what lies on the inner side of every plane is drawn."""
+        if len(planes):
+            self._program["clipping_planes"].write(planes.astype(np.float32).tobytes())
+        for number in range(len(planes)):
+            self._context.enable_direct(_CLIP_DISTANCE + number)
+        yield
+        for number in range(len(planes)):
+            self._context.disable_direct(_CLIP_DISTANCE + number)

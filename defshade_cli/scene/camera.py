@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -16,6 +16,9 @@ Projection = Literal["perspective", "orthographic"]
 
 
 DEFAULT_SIZE = (1920, 1080)
+
+MOST_CLIPPING_PLANES = 8
+"""What every OpenGL 4 driver can do: GL_MAX_CLIP_DISTANCES."""
 
 
 def image_size(
@@ -48,6 +51,7 @@ class Camera:
     exposure: linear scale of the camera's exposure attributes (UsdGeomCamera.ComputeLinearExposureScale).
     f_stop, focus_distance, focal_length: lens; f_stop 0 is a pinhole.
     shutter: (open, close) in time codes around the frame.
+    clipping_planes: (N, 4) float64; of (x, y, z) in camera space what has a x + b y + c z + d < 0 is cut off.
     """
 
     path: str
@@ -60,9 +64,11 @@ class Camera:
     focus_distance: float = 0.0
     focal_length: float = 0.0
     shutter: tuple[float, float] = (0.0, 0.0)
+    clipping_planes: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4)))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "world_from_camera", frozen(self.world_from_camera, np.float64, 4, 4))
+        object.__setattr__(self, "clipping_planes", frozen(self.clipping_planes, np.float64, -1, 4))
 
     @property
     def position(self) -> NDArray[np.float64]:

@@ -43,7 +43,10 @@ def cone_cage(height: float, radius: float) -> Polygons:
 def capsule_cage(height: float, top: float, bottom: float) -> Polygons:
     """Of radii that differ the mantle is tangent to the spheres, which are centred `height` apart."""
     meet = math.asin(max(-1.0, min((bottom - top) / height, 1.0))) if height else 0.0
-    elevations = np.linspace(-math.pi / 2, meet, _CAP_BANDS + 1)[1:], np.linspace(meet, math.pi / 2, _CAP_BANDS + 1)[:-1]
+    elevations = (
+        np.linspace(-math.pi / 2, meet, _CAP_BANDS + 1)[1:],
+        np.linspace(meet, math.pi / 2, _CAP_BANDS + 1)[:-1],
+    )
     ends = ((bottom, -0.5 * height), (top, 0.5 * height))
     rings = [_on_sphere(r, h, e) for (r, h), band in zip(ends, elevations, strict=True) for e in band]
     return _swept([rings], bottom=-0.5 * height - bottom, top=0.5 * height + top)

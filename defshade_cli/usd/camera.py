@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, UsdGeom
 
 from defshade_cli.errors import PrimNotFound, StageError
-from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.camera import MOST_CLIPPING_PLANES, Camera
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.spaces import rigid, translation
 from defshade_cli.usd.xform import matrix
@@ -72,9 +72,10 @@ def read_camera(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Camera, tuple[Unsup
         focus_distance=gf.focusDistance,
         focal_length=gf.focalLength * Gf.Camera.FOCAL_LENGTH_UNIT,
         shutter=(schema.GetShutterOpenAttr().Get(time), schema.GetShutterCloseAttr().Get(time)),
+        clipping_planes=np.array(gf.clippingPlanes[:MOST_CLIPPING_PLANES], np.float64).reshape(-1, 4),
     )
-    issues = (Unsupported(path, "clippingPlanes are ignored"),) if gf.clippingPlanes else ()
-    return camera, issues
+    left_out = len(gf.clippingPlanes) - MOST_CLIPPING_PLANES
+    return camera, (Unsupported(path, f"{left_out} clippingPlanes are ignored"),) if left_out > 0 else ()
 
 
 def framed_camera(bounds: NDArray[np.float64], up_axis: str) -> Camera:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from pxr import Sdf, Usd, UsdGeom
 
+from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.usd.binding import Bindings, read_bindings
 from defshade_cli.usd.geometry import Surface, is_time_varying, read_surface
 from defshade_cli.usd.kind import Kinds
@@ -15,13 +16,14 @@ from defshade_cli.usd.material import ReadMaterial, read_material
 class Memory:
     """The unchanging parts of one stage, and the names of what stands in its prototypes.
 
-    as_cages: see gprims.read_solid.  kinds: of prims.  xforms: USD's cache, which drops only what varies when its time is set.
+    as_cages: see gprims.read_solid.  kinds: of prims.
+    xforms: USD's cache, which drops only what varies when its time is set.
     """
 
-    def __init__(self, stage: Usd.Stage, *, as_cages: bool = False) -> None:
+    def __init__(self, stage: Usd.Stage, extras: Extras = NO_EXTRAS, *, as_cages: bool = False) -> None:
         self.kinds = Kinds()
         self.xforms = UsdGeom.XformCache()
-        self._stage, self._as_cages = stage, as_cages
+        self._stage, self._extras, self._as_cages = stage, extras, as_cages
         self._surfaces: dict[Sdf.Path, tuple[Usd.TimeCode, Surface | None]] = {}
         self._time_varying: dict[Sdf.Path, bool] = {}
         self._bindings: dict[Sdf.Path, Bindings] = {}
@@ -42,7 +44,7 @@ class Memory:
     def material(self, path: Sdf.Path, time: Usd.TimeCode) -> ReadMaterial:
         if path in self._materials:
             return self._materials[path]
-        read = read_material(self._stage, path, self.shown(path), time)
+        read = read_material(self._stage, path, self.shown(path), time, occlusion=self._extras.occlusion)
         if not read.time_varying:
             self._materials[path] = read
         return read

@@ -11,6 +11,7 @@ from pxr import Usd
 
 from defshade_cli.errors import EmptyStage
 from defshade_cli.scene.camera import Camera, image_size
+from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import UNBOUND
@@ -19,6 +20,7 @@ from defshade_cli.settings import Complexity
 from defshade_cli.usd import stage as facts
 from defshade_cli.usd.camera import choose_camera, find_cameras, framed_camera, read_camera
 from defshade_cli.usd.complexity import View, choose_levels
+from defshade_cli.usd.copies import rounded
 from defshade_cli.usd.extent import extent_of
 from defshade_cli.usd.geometry import Gprim, Surface
 from defshade_cli.usd.instancing import Piece
@@ -41,6 +43,7 @@ class StageReader:
     camera: path or name; without it the rule of usd/camera.py picks.  purposes: of the geometry that is drawn.
     complexity: of subdivision surfaces and, where it is not `auto`, of solids as Hydra makes cages of them; for `auto`
         it matters how large the image is, see scene.camera.image_size.
+    extras: what only some layers need.
     Raises PrimNotFound for a camera that the stage lacks.
     """
 
@@ -53,14 +56,15 @@ class StageReader:
         complexity: Complexity = "auto",
         size: tuple[int, int] | None = None,
         width: int | None = None,
+        extras: Extras = NO_EXTRAS,
     ) -> None:
         self._stage, self._purposes = stage, tuple(purposes)
         self._complexity, self._size, self._width = complexity, size, width
-        self._memory = Memory(stage, as_cages=complexity != "auto")
+        self._memory = Memory(stage, extras, as_cages=complexity != "auto")
         self._tessellation = Tessellation()
         self._settings = read_settings(stage)
         self._cameras = find_cameras(stage)
-        self._issues = (*(arc.unsupported for arc in find_unresolved(stage)), *self._settings.issues)
+        self._issues = tuple(arc.unsupported for arc in find_unresolved(stage))
         self._camera = choose_camera(stage, self._cameras, camera, self._settings.camera)
 
     @property
@@ -86,10 +90,11 @@ class StageReader:
     def _read(self, frame: float | None, time: Usd.TimeCode) -> Scene:
         traversal = Traversal(self._stage, self._memory, time, self._purposes)
         pieces = traversal.read_stage()
-        drawn = tuple(_drawn(pieces, self._purposes))
+        placed = tuple(_surfaces(pieces, self._purposes))
+        drawn = tuple((piece, surface) for piece, surface in placed if surface.groups)
         if not drawn and not traversal.dormant:
             raise EmptyStage(_empty(self._stage, traversal.issues))
-        camera, camera_issues = self._read_camera(time, drawn)
+        camera, camera_issues = self._read_camera(time, placed)
         gprims = self._tessellate(drawn, camera)
         palette = Palette(self._memory, time)
         meshes: dict[Mesh, int] = {}
@@ -111,14 +116,16 @@ class StageReader:
             resolution=self._settings.resolution,
             pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
+            data_window=self._settings.data_window,
         )
 
     def _read_camera(
-        self, time: Usd.TimeCode, drawn: Iterable[PlacedSurface]
+        self, time: Usd.TimeCode, placed: Iterable[PlacedSurface]
     ) -> tuple[Camera, tuple[Unsupported, ...]]:
-        """The camera; one of ours frames the surfaces as authored, however they are refined."""
+        """The camera; one of ours frames the surfaces as authored, however they are refined, empty ones too."""
         if self._camera is None:
-            boxes = (world_boxes(extent_of(self._stage, surface, time), piece.root_from_object) for piece, surface in drawn)
+            extents = ((extent_of(self._stage, surface, time), piece.root_from_object) for piece, surface in placed)
+            boxes = (world_boxes(*extent) for extent in extents)
             return framed_camera(enclose(boxes), facts.up_axis(self._stage)), ()
         camera, issues = read_camera(self._camera, time)
         return self._settings.applied_to(camera), issues
@@ -132,7 +139,7 @@ class StageReader:
         return {surface: self._tessellation.at_level(surface, level) for surface, level in levels.items()}
 
 
-def _drawn(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[PlacedSurface]:
+def _surfaces(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[PlacedSurface]:
     for piece in pieces:
         if isinstance(piece.content, Surface) and (piece.purpose or "default") in purposes:
             yield piece, piece.content
@@ -149,7 +156,7 @@ def _drawables(
         subsets = (Subset(palette.number(piece.bindings[g.path]), g.first, g.count) for g in gprim.groups)
         yield Drawable(
             mesh=meshes.setdefault(gprim.mesh, len(meshes)),
-            world_from_object=piece.root_from_object,
+            world_from_object=rounded(piece.root_from_object) if surface.copies else piece.root_from_object,
             subsets=tuple(subsets),
             paths=piece.paths,
             instance_ids=piece.ids,

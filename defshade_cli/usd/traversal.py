@@ -103,9 +103,7 @@ class Traversal:
             self._report(prim, f"prims of type {prim.GetTypeName()} are not drawn")
             return
         self.issues.update(dict.fromkeys(surface.issues))
-        if not surface.groups:
-            self.dormant |= is_time_varying(prim)
-            return
+        self.dormant |= not surface.groups and is_time_varying(prim)
         yield self._piece(prim, here, surface, {path: self._memory.bindings(path) for path in surface.groups})
 
     def _piece(

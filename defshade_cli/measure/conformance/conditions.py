@@ -44,7 +44,8 @@ def _camera(conditions: Conditions, scene: Scene) -> Camera:
     aspect = conditions.size[0] / conditions.size[1]
     window = _cropped(conform_window(camera.window, aspect, scene.conform), conditions.crop)
     bare = all(material.path == UNBOUND.path for material in scene.materials)
-    return replace(camera, window=window, exposure=math.pi if bare else 1.0, f_stop=0.0)
+    planes = np.concatenate([camera.clipping_planes, np.reshape(conditions.clip_planes, (-1, 4))])
+    return replace(camera, window=window, exposure=math.pi if bare else 1.0, f_stop=0.0, clipping_planes=planes)
 
 
 def _looking(conditions: Conditions) -> Camera:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.image.reading import read
 from defshade_cli.image.film import Film
-from defshade_cli.measure.conformance.catalogue import Case, Conditions
+from defshade_cli.image.reading import read
+from defshade_cli.measure.conformance.catalogue import Case
 from defshade_cli.measure.conformance.conditions import under
 from defshade_cli.measure.conformance.silhouette import (
     ANY_SAMPLE,
