@@ -11,7 +11,7 @@ import OpenImageIO as oiio
 import pytest
 
 from defshade_cli import __version__
-from defshade_cli.image import files
+from defshade_cli.image import files, reading
 from defshade_cli.image.metadata import frame_rate, provenance, world_to_camera, world_to_ndc
 from defshade_cli.scene.camera import Camera
 from defshade_cli.settings import OutputSettings
@@ -99,7 +99,7 @@ def test_dates_are_local_time_with_its_offset(exr: Path) -> None:
 
 
 def test_provenance_comes_back_from_exr_with_its_types(exr: Path) -> None:
-    header = files.read_header(exr)
+    header = reading.read_header(exr)
     assert (header["scene"], header["camera"], header["samples"]) == ("kitchen", "/World/Cam", 16)
     assert (header["frame"], header["seconds"], header["sizes"]) == (12.0, 1.5, "[1, 2]")
 
@@ -108,7 +108,7 @@ def test_provenance_comes_back_from_exr_with_its_types(exr: Path) -> None:
 def test_provenance_comes_back_from_pictures_as_text(suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"a{suffix}"
     files.write(film("beauty"), OutputSettings(), path)
-    header = files.read_header(path)
+    header = reading.read_header(path)
     assert (header["scene"], header["stage hash"], header["samples"]) == ("kitchen", "0123abcd", "16")
 
 

@@ -10,6 +10,9 @@ from typing import Literal
 Source = Literal["lighting", "base", "metallic", "normal", "roughness", "emission", "depth"]
 
 BEAUTY = "beauty"
+MAIN_PART = "rgba"
+"""The part of a multi-part EXR that holds the beauty, as Nuke names it."""
+
 SCENE_LINEAR, SCENE_UNITS, UNIT_VECTOR = "scene-linear", "scene units", "unit vector"
 
 

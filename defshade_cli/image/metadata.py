@@ -123,7 +123,7 @@ def world_to_ndc(camera: Camera) -> Matrix:
 def _camera(film: Film) -> Iterator[Attribute]:
     camera = film.camera
     left, right, bottom, top = camera.window
-    width, height = film.size
+    width, height = film.display_size
     yield Attribute("worldToCamera", "matrix", _floats(world_to_camera(camera)))
     yield Attribute("worldToNDC", "matrix", _floats(world_to_ndc(camera)))
     yield Attribute("screenWindowCenter", "float2", (0.5 * (left + right), 0.5 * (bottom + top)))

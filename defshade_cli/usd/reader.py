@@ -27,6 +27,7 @@ from defshade_cli.usd.palette import Palette
 from defshade_cli.usd.settings import read_settings
 from defshade_cli.usd.tessellation import Tessellation
 from defshade_cli.usd.traversal import Traversal
+from defshade_cli.usd.unresolved import find_unresolved
 
 log = logging.getLogger("defshade")
 
@@ -57,6 +58,7 @@ class StageReader:
         self._tessellation = Tessellation()
         self._settings = read_settings(stage)
         self._cameras = find_cameras(stage)
+        self._issues = tuple(arc.unsupported for arc in find_unresolved(stage))
         self._camera = choose_camera(stage, self._cameras, camera, self._settings.camera)
 
     @property
@@ -99,7 +101,7 @@ class StageReader:
             lights=tuple(_lights(pieces)),
             camera=camera,
             cameras=self._cameras,
-            unsupported=(*traversal.issues, *mended, *palette.issues, *camera_issues, *self._settings.issues),
+            unsupported=(*self._issues, *traversal.issues, *mended, *palette.issues, *camera_issues),
             meters_per_unit=facts.meters_per_unit(self._stage),
             up_axis=facts.up_axis(self._stage),
             frame=frame,
@@ -107,6 +109,7 @@ class StageReader:
             resolution=self._settings.resolution,
             pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
+            data_window=self._settings.data_window,
         )
 
     def _read_camera(
