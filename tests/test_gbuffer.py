@@ -180,3 +180,22 @@ def test_instances_bear_their_own_colour_and_vertices_theirs(pipeline: Pipeline)
     centre = albedo[31:33, 44:46].mean((0, 1))  # on the diagonal red–blue
     np.testing.assert_allclose(centre.sum(), 1.0, atol=0.15)
     assert albedo[27, 40].min() > 0.8  # the upper left corner is white
+
+
+@pytest.mark.parametrize("turned", [0.0, 90.0])
+def test_clipping_planes_cut_in_camera_space(pipeline: Pipeline, turned: float) -> None:
+    """What lies to the camera's left goes, wherever the camera stands; the next frame without planes is whole."""
+    world_from_camera = rotated("z", turned) @ translation(np.array([0.0, 0.0, 4.0]))
+    whole = scene([quad(9.0)], [sun()], view=replace(camera(half=1.0), world_from_camera=world_from_camera))
+    halved = replace(whole, camera=replace(whole.camera, clipping_planes=np.array([[1.0, 0.0, 0.0, 0.0]])))
+    depth = stored(pipeline, halved, "float")["depth"]
+    assert (depth[:, :32] == 0.0).all() and (depth[:, 32:] > 0.0).all()
+    assert (stored(pipeline, whole, "float")["depth"] > 0.0).all()
+
+
+def test_two_clipping_planes_leave_what_lies_within_both(pipeline: Pipeline) -> None:
+    whole = scene([quad(9.0)], [sun()])
+    planes = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
+    depth = stored(pipeline, replace(whole, camera=replace(whole.camera, clipping_planes=planes)), "float")["depth"]
+    covered = depth > 0.0
+    assert covered[:32, 32:].all() and covered.sum() == 32 * 32

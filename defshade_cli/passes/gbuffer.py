@@ -102,8 +102,8 @@ class GBufferPass:
     @contextmanager
     def _clipped(self, planes: NDArray[np.float64]) -> Iterator[None]:
         """Only what lies on the inner side of every plane is drawn."""
-        if len(planes):
-            self._program["clipping_planes"].write(planes.astype(np.float32).tobytes())
+        if values := [tuple(plane) for plane in planes.tolist()]:
+            self._program["clipping_planes"] = values if len(values) > 1 else values[0]
         for number in range(len(planes)):
             self._context.enable_direct(_CLIP_DISTANCE + number)
         yield

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
 from defshade_cli.usd.geometry import Surface
 from defshade_cli.usd.values import floats
+
+
+def stage_extent(stage: Usd.Stage, purposes: Sequence[str]) -> NDArray[np.float64]:
+    """(2, 3) the box around all of a stage at the default time, in world space, as UsdGeomBBoxCache has it."""
+    cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), list(purposes), useExtentsHint=True)
+    box = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
+    return np.array([box.GetMin(), box.GetMax()], np.float64)
 
 
 def extent_of(stage: Usd.Stage, surface: Surface, time: Usd.TimeCode) -> NDArray[np.float64]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom
+from pxr import Usd, UsdGeom, Vt
 
 from defshade_cli.usd.normals import mend_normals
 from defshade_cli.usd.polygons import SCHEMES, Polygons, Primvar, Scheme
@@ -41,7 +41,9 @@ def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> Poly
 
 def _points(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> NDArray[np.float32]:
     value = mesh.GetPointsAttr().Get(time)
-    points = None if value is None else floats(value, 3)
+    points = floats(value, 3) if isinstance(value, Vt.Vec3fArray) else None
+    if value is not None and points is None:
+        issues.append(f"points are {mesh.GetPointsAttr().GetTypeName()}, which the schema does not allow")
     if points is None or not len(points):
         issues.append("it has no points")
         return np.empty((0, 3), np.float32)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -20,6 +20,7 @@ Maker = Literal["storm", "usdrecord", "arnold", "viewer", "none"]
 Lighting = Literal["stage", "unlit", "distant"]
 """The stage's own lights; none, colours as they are; one white distant light beside the stage's own."""
 
+Options = Mapping[str, Sequence[Sequence[str]]]
 Rectangle = tuple[float, float, float, float]
 
 STORM_BACKGROUND = (1.0, 0.5, 0.1)
@@ -32,42 +33,45 @@ class Conditions:
 
     size: (width, height) in pixels; None takes the reference image's.
     frame: time code; None is the default time, "first" the stage's first frame.
-    camera: prim path; None and no `eye`: the rule of usd/camera.py.
-    eye: world-space place of a camera of ours with a vertical field of view of 60°, which looks along −Z, or along +Y
-        where Z is up; `look` says which.
+    camera: prim path; None and no `translate`: the rule of usd/camera.py.
+    translate: what the drawing test moves the stage by, which it has turned so that Y is up, where it names no camera;
+        "frame" moves the stage's box into view.
     conform: how the camera's window is fitted to the image, where the stage does not say so.
     crop: (left, top, right, bottom), the part of that camera's image that is shown, each 0..1.
     clip_planes: (a, b, c, d) each, in camera space, as UsdGeomCamera has them.
-    light: vector towards a white distant light of irradiance 1, world space.
+    camera_light: the distant light stands where the drawing test puts one for `-camlight`.
     background: scene-linear, opaque; None is transparent black.
     """
 
     size: tuple[int, int] | None = None
     frame: float | Literal["first"] | None = "first"
     camera: str | None = None
-    eye: tuple[float, float, float] | None = None
-    look: Literal["-Z", "+Y"] = "-Z"
+    translate: tuple[float, float, float] | Literal["frame"] | None = None
     conform: ConformPolicy | None = None
     crop: Rectangle = (0.0, 0.0, 1.0, 1.0)
     clip_planes: tuple[Rectangle, ...] = ()
     complexity: Complexity = "auto"
     purposes: tuple[str, ...] = ("default", "render")
     lighting: Lighting = "stage"
-    light: tuple[float, float, float] = (0.0, -0.5, 0.5)
+    camera_light: bool = False
     background: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One picture to make. key: unique, fit for a file name.  image: the reference, None where there is none."""
+    """One picture to make.
+
+    key: unique, fit for a file name.  stage_name: the stage's path below its item.
+    image: the reference, None where there is none.
+    """
 
     key: str
     item: str
     stage: Path
+    stage_name: str
     image: Path | None
     maker: Maker
     conditions: Conditions
-    command: str = ""
 
 
 def assets_folder() -> Path:
@@ -80,26 +84,24 @@ def assets_folder() -> Path:
 
 def read_items(folder: Path) -> dict[str, tuple[Case, ...]]:
     """Item name → its cases, in the order of its ITEM.json."""
-    return {path.parent.name: tuple(_cases(path)) for path in sorted(folder.glob("*/ITEM.json"))}
+    return {path.parent.name: read_item(path.parent) for path in sorted(folder.glob("*/ITEM.json"))}
 
 
-def _cases(path: Path) -> Iterator[Case]:
-    item = path.parent
-    number = 0
-    for scene in json.loads(path.read_text("utf-8"))["scenes"]:
-        stage = item / scene["scene"]
-        for reference in scene["references"] or [{}]:
-            yield _case(f"{item.name}-{number:02}", item, stage, reference)
-            number += 1
+def read_item(item: Path) -> tuple[Case, ...]:
+    """One for each reference of each stage of an item's folder, and one for each stage without any."""
+    scenes = json.loads((item / "ITEM.json").read_text("utf-8"))["scenes"]
+    pairs = [(scene["scene"], reference) for scene in scenes for reference in scene["references"] or [{}]]
+    return tuple(_case(f"{item.name}-{n:02}", item, *pair) for n, pair in enumerate(pairs))
 
 
-def _case(key: str, item: Path, stage: Path, reference: Mapping[str, Any]) -> Case:
+def _case(key: str, item: Path, name: str, reference: Mapping[str, Any]) -> Case:
+    stage = item / name
     if not reference:
-        return Case(key, item.name, stage, None, "none", Conditions(size=(640, 480)))
+        return Case(key, item.name, stage, name, None, "none", Conditions(size=(640, 480)))
     command = reference.get("command", "")
     maker = _maker(reference, command)
     conditions = {"storm": _storm, "usdrecord": _usdrecord, "arnold": _arnold}.get(maker, _viewer)
-    return Case(key, item.name, stage, item / reference["image"], maker, conditions(reference, command), command)
+    return Case(key, item.name, stage, name, item / reference["image"], maker, conditions(reference, command))
 
 
 def _maker(reference: Mapping[str, Any], command: str) -> Maker:
@@ -115,47 +117,43 @@ def _storm(reference: Mapping[str, Any], command: str) -> Conditions:
     """testUsdImagingGLBasicDrawing: REFERENCES.md beside the items describes it."""
     options = _options(command)
     time = reference["time"]
-    eye = reference.get("eye")
     return Conditions(
         size=tuple(reference["resolution"]),
         frame=time if isinstance(time, float) else None,
         camera=reference.get("camera"),
-        eye=tuple(eye) if eye else None,
-        look="+Y" if reference.get("look", "").startswith("+Y") else "-Z",
+        translate=None if "camera" in options else _translate(options),
         conform="adjustApertureWidth",
         crop=_crop(options),
-        clip_planes=tuple(tuple(map(float, plane)) for plane in options.get("clipPlane", ())),
+        clip_planes=tuple((float(a), float(b), float(c), float(d)) for a, b, c, d in options.get("clipPlane", ())),
         complexity=_COMPLEXITIES[_complexity(reference, options)],
         purposes=_purposes(options),
         lighting=_lighting(options),
-        light=_light(options, reference),
+        camera_light="camlight" in options,
         background=tuple(reference["background_linear"][:3]),
     )
 
 
-def _complexity(reference: Mapping[str, Any], options: Mapping[str, Sequence[Sequence[str]]]) -> float:
+def _complexity(reference: Mapping[str, Any], options: Options) -> float:
     """With `-complexities` the image is named after its own."""
     if "complexities" in options:
         return float(Path(reference["image"]).stem.rpartition("_")[2])
     return float(reference.get("complexity", 1.0))
 
 
-def _lighting(options: Mapping[str, Sequence[Sequence[str]]]) -> Lighting:
+def _lighting(options: Options) -> Lighting:
     if "lighting" not in options:
         return "unlit"
     return "stage" if "sceneLights" in options else "distant"
 
 
-def _light(options: Mapping[str, Any], reference: Mapping[str, Any]) -> tuple[float, float, float]:
-    """`-camlight` takes the camera's translation, the negative of the eye, for a direction in which Z is up."""
-    if "camlight" not in options:
-        return (0.0, -0.5, 0.5)
-    x, y, z = reference["eye"]
-    tx, ty, tz = (-x, -z, y) if reference["look"].startswith("+Y") else (-x, -y, -z)
-    return (tx, tz, ty)
+def _translate(options: Options) -> tuple[float, float, float] | Literal["frame"]:
+    if "frameAll" in options:
+        return "frame"
+    x, y, z = map(float, options["translate"][0]) if "translate" in options else (0.0, -1000.0, -2500.0)
+    return x, y, z
 
 
-def _purposes(options: Mapping[str, Sequence[Sequence[str]]]) -> tuple[str, ...]:
+def _purposes(options: Options) -> tuple[str, ...]:
     shown = {"guide": "guidesPurpose" in options, "render": "renderPurpose" in options, "proxy": True}
     for purpose, name in (("guide", "guidesPurpose"), ("render", "renderPurpose"), ("proxy", "proxyPurpose")):
         if name in options:
@@ -163,7 +161,7 @@ def _purposes(options: Mapping[str, Sequence[Sequence[str]]]) -> tuple[str, ...]
     return ("default", *(purpose for purpose, is_shown in shown.items() if is_shown))
 
 
-def _crop(options: Mapping[str, Sequence[Sequence[str]]]) -> Rectangle:
+def _crop(options: Options) -> Rectangle:
     """The camera fills the display window, of which the image shows the data window."""
     if "displayWindow" not in options:
         return (0.0, 0.0, 1.0, 1.0)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +27,17 @@ from defshade_cli.plan import make_plan
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderSettings
+from defshade_cli.usd.extent import stage_extent
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.stage import open_stage
 
 Picture = NDArray[np.float32]
 
-SAMPLES = {"storm": 64, "usdrecord": 64, "arnold": 64, "viewer": 4, "none": 4}
+SAMPLES = {"arnold": 64, "viewer": 4, "none": 4}
+OPACITY_SAMPLES = 64
+"""At each of Storm's four places, so that the mean of coins is an opacity."""
+_NARROWEST = 1e-3  # pixels
+
 MULTISAMPLE = ((0.375, 0.875), (0.875, 0.625), (0.125, 0.375), (0.625, 0.125))
 """Where OpenGL takes the four samples of a pixel, from its upper left corner: Direct3D's places upside down."""
 
@@ -40,39 +46,18 @@ _BACKDROP = (0.2, 0.2, 0.2)
 _OURS_ALONE, _THEIRS_ALONE = (1.0, 0.45, 0.0), (0.0, 0.7, 1.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Result:
-    """What became of a case.
-
-    iou: of the silhouettes; rmse: of the 8-bit pictures in [0, 1]. None where the reference does not allow it.
-    error: why there is no picture.  unsupported: what of the stage was left out, `path: reason` each.
-    """
-
-    key: str
-    item: str
-    stage: str
-    reference: str
-    maker: str
-    iou: float | None = None
-    rmse: float | None = None
-    note: str = ""
-    error: str = ""
-    unsupported: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
-    seconds: dict[str, float] = field(default_factory=dict)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Drawn:
-    """Display-ready pictures (H, W, 3) in [0, 1]; reference and difference are None where there is none."""
+    """pictures: "ours", and where there are any "reference" and "difference" → (H, W, 3) in [0, 1], display-ready.
 
-    ours: Picture
-    reference: Picture | None
-    difference: Picture | None
-    iou: float | None
-    rmse: float | None
+    iou, rmse, unsupported, seconds: as in Result.
+    """
+
+    pictures: dict[str, Picture]
     unsupported: tuple[str, ...]
     seconds: dict[str, float]
+    iou: float | None = None
+    rmse: float | None = None
 
 
 def draw(case: Case, pipeline: Pipeline) -> Drawn:
@@ -81,34 +66,39 @@ def draw(case: Case, pipeline: Pipeline) -> Drawn:
     start = time.perf_counter()
     scene = _scene(case, _size(case, reference))
     read_at = time.perf_counter()
-    pixels = _render(case, pipeline, scene, _size(case, reference))
+    pixels, alpha = _render(case, pipeline, scene, _size(case, reference))
     seconds = {"read": read_at - start, "draw": time.perf_counter() - read_at}
     unsupported = tuple(f"{issue.path}: {issue.reason}" for issue in scene.unsupported)
-    ours = _shown(case, pixels)
-    if reference is None:
-        return Drawn(ours, None, None, None, None, unsupported, seconds)
-    theirs = _reference_shown(case, reference)
-    if case.maker == "viewer":
-        return Drawn(ours, theirs, None, None, None, unsupported, seconds)
-    masks = _masks(case, pixels, reference)
+    drawn = Drawn({"ours": _shown(case, pixels)}, unsupported, seconds)
+    return drawn if reference is None else _compared(case, drawn, alpha, reference)
+
+
+def _compared(case: Case, drawn: Drawn, alpha: Picture, reference: Picture) -> Drawn:
+    """With the reference, and with what its maker's conditions allow to be measured."""
+    ours, theirs = drawn.pictures["ours"], _reference_shown(case, reference)
+    masks = None if case.maker == "viewer" else _masks(case, alpha, reference)
     if masks is None:
-        return Drawn(ours, theirs, None, None, None, unsupported, seconds)
-    rmse = float(np.sqrt(np.mean((ours - theirs) ** 2))) if case.maker in ("storm", "arnold") else None
-    difference = _difference(ours, theirs, *masks)
-    return Drawn(ours, theirs, difference, intersection_over_union(*masks), rmse, unsupported, seconds)
+        return replace(drawn, pictures={"ours": ours, "reference": theirs})
+    return replace(
+        drawn,
+        pictures={"ours": ours, "reference": theirs, "difference": _difference(ours, theirs, *masks)},
+        iou=intersection_over_union(*masks),
+        rmse=float(np.sqrt(np.mean((ours - theirs) ** 2))) if case.maker in ("storm", "arnold") else None,
+    )
 
 
 def _scene(case: Case, size: tuple[int, int]) -> Scene:
     conditions = case.conditions
+    stage = open_stage(case.stage)
     reader = StageReader(
-        open_stage(case.stage),
+        stage,
         camera=conditions.camera,
         purposes=conditions.purposes,
         complexity=conditions.complexity,
         size=size,
     )
     frame = reader.first_frame() if conditions.frame == "first" else conditions.frame
-    return under(conditions, reader.read(frame))
+    return under(conditions, reader.read(frame), stage_extent(stage, conditions.purposes))
 
 
 def _size(case: Case, reference: Picture | None) -> tuple[int, int]:
@@ -119,19 +109,29 @@ def _size(case: Case, reference: Picture | None) -> tuple[int, int]:
     return round(width * scale), round(height * scale)
 
 
-def _render(case: Case, pipeline: Pipeline, scene: Scene, size: tuple[int, int]) -> Picture:
-    """(H, W, 4) scene-linear, premultiplied; Storm's four samples a pixel where their places are known to matter."""
-    is_storm = case.maker == "storm"
-    unlit = case.conditions.lighting == "unlit"
-    layers = ("depth", "albedo") if unlit else ("beauty",)
-    settings = RenderSettings(size=size, layers=layers, shadows=not is_storm, background=not is_storm)
+def _render(case: Case, pipeline: Pipeline, scene: Scene, size: tuple[int, int]) -> tuple[Picture, Picture]:
+    """(H, W, 4) scene-linear, premultiplied, and (H, W) alpha; with Storm's samples where it drew the reference."""
+    settings = RenderSettings(size=size, shadows=case.maker != "storm", background=case.maker != "storm")
+    if case.maker not in ("storm", "usdrecord"):
+        plan = make_plan(scene, replace(settings, samples=SAMPLES[case.maker]))
+        pixels = pipeline.render(scene, plan).layers["beauty"]
+        return pixels, pixels[..., 3]
+    if case.conditions.lighting == "unlit":
+        settings = replace(settings, layers=("depth", "albedo"))
+    pixels = np.mean([_pixels(film) for film in _multisampled(pipeline, scene, settings)], axis=0)
+    if not make_plan(scene, settings).cutout:
+        return pixels, pixels[..., 3]
+    settings = replace(settings, layers=("alpha",), samples=OPACITY_SAMPLES, filter_width=_NARROWEST)
+    alpha = [film.layers["alpha"][..., 0] for film in _multisampled(pipeline, scene, settings)]
+    return pixels, np.mean(alpha, axis=0)
+
+
+def _multisampled(pipeline: Pipeline, scene: Scene, settings: RenderSettings) -> Iterator[Film]:
+    """A film for each of Storm's places in the pixel."""
     plan = make_plan(scene, settings)
-    if case.maker not in ("storm", "usdrecord") or plan.cutout:
-        settings = replace(settings, samples=SAMPLES[case.maker], layers=("beauty",))
-        return pipeline.render(scene, make_plan(scene, settings)).layers["beauty"]
-    scenes = (replace(scene, camera=_moved(plan.camera, size, place)) for place in MULTISAMPLE)
-    films = [pipeline.render(moved, make_plan(moved, settings)) for moved in scenes]
-    return np.mean([_unlit(film) if unlit else film.layers["beauty"] for film in films], axis=0)
+    for place in MULTISAMPLE:
+        moved = replace(scene, camera=_moved(plan.camera, plan.size, place))
+        yield pipeline.render(moved, make_plan(moved, settings))
 
 
 def _moved(camera: Camera, size: tuple[int, int], place: tuple[float, float]) -> Camera:
@@ -141,10 +141,12 @@ def _moved(camera: Camera, size: tuple[int, int], place: tuple[float, float]) ->
     return replace(camera, window=(left + dx, right + dx, bottom + dy, top + dy))
 
 
-def _unlit(film: Film) -> Picture:
-    """Colours as they are, premultiplied by coverage."""
+def _pixels(film: Film) -> Picture:
+    """The beauty, or without one the colours as they are, premultiplied by coverage."""
+    if "beauty" in film.layers:
+        return film.layers["beauty"]
     covered = np.isfinite(film.layers["depth"]).astype(np.float32)
-    return np.concatenate([film.layers["albedo"], covered], axis=-1)
+    return np.concatenate([film.layers["albedo"] * covered, covered], axis=-1)
 
 
 def _shown(case: Case, pixels: Picture) -> Picture:
@@ -163,10 +165,10 @@ def _reference_shown(case: Case, reference: Picture) -> Picture:
     return rgb * reference[..., 3:] + _srgb(np.array(_BACKDROP)) * (1.0 - reference[..., 3:])
 
 
-def _masks(case: Case, pixels: Picture, reference: Picture) -> tuple[Mask, Mask] | None:
+def _masks(case: Case, alpha: Picture, reference: Picture) -> tuple[Mask, Mask] | None:
     """Our silhouette and the reference's; None where the reference has none to read off."""
     threshold = HALF if case.maker == "arnold" else ANY_SAMPLE
-    ours = mask_of_alpha(pixels[..., 3], threshold)
+    ours = mask_of_alpha(alpha, threshold)
     if case.maker != "storm":
         return ours, mask_of_alpha(reference[..., 3], threshold)
     background = even_background(reference[..., :3])

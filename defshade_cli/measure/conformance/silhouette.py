@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 Mask = NDArray[np.bool_]
 Color = tuple[float, float, float]
 
-ANY_SAMPLE, HALF = 0.1, 0.5
-"""Thresholds of alpha: below one of four samples, and half of the pixel."""
+ANY_SAMPLE, HALF = 0.01, 0.5
+"""Thresholds of alpha: something of a pixel, and half of it."""
 
 _STEP = 1.0 / 255.0
 
