@@ -13,6 +13,7 @@ from typing import Any
 from pxr import Tf, Usd, UsdGeom, UsdUtils
 
 from defshade_cli.errors import StageNotFound
+from defshade_cli.usd.materialx.documents import is_about_documents, supply_documents
 
 log = logging.getLogger("defshade")
 
@@ -28,9 +29,11 @@ def open_stage(path: Path) -> Usd.Stage:
         raise StageNotFound(f"no such file: {path}")
     with gathered_diagnostics():
         try:
-            return Usd.Stage.Open(str(path))
+            stage = Usd.Stage.Open(str(path))
         except Tf.ErrorException as error:
             raise StageNotFound(f"{path} is not a USD stage: {_first_line(error)}") from None
+        supply_documents(stage)
+    return stage
 
 
 @contextmanager
@@ -41,8 +44,10 @@ def gathered_diagnostics() -> Iterator[None]:
         yield
     finally:
         for kind in delegate.TakeCoalescedDiagnostics():
-            first, *more = (_ADDRESS.sub("", item.commentary).strip() for item in kind.unsharedItems)
-            log.warning("USD: %s%s", first, f" (and {len(more)} more like it)" if more else "")
+            lines = [_ADDRESS.sub("", item.commentary).strip() for item in kind.unsharedItems]
+            first, *more = [line for line in lines if not is_about_documents(line)] or [""]
+            if first:
+                log.warning("USD: %s%s", first, f" (and {len(more)} more like it)" if more else "")
 
 
 def stage_name(stage: Usd.Stage) -> str:
