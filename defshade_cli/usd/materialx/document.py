@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pxr import Ar, Sdf, Tf
+from pxr import Ar, Sdf, Tf, UsdShade
 
 if TYPE_CHECKING:
     import MaterialX as mx
@@ -30,6 +30,7 @@ _TYPES = {
 """MaterialX types → USD's; all others are tokens, which only carry connections."""
 
 _SURFACE = "surfaceshader"
+_SOURCE = "materialx"
 
 
 class NotADocument(Exception):
@@ -62,14 +63,22 @@ def layer_of(document: mx.Document, resolved: str) -> Sdf.Layer:
         for node in document.getMaterialNodes():
             _Writer(layer, document, resolved, materials.AppendChild(_name(node))).write(node)
     layer.defaultPrim = ROOT.name
+    layer.customLayerData = {_SOURCE: resolved}
     return layer
 
 
+def source_of(identifier: str) -> str:
+    """Where the document was read from that became the anonymous layer of that name; empty for any other name."""
+    layer = Sdf.Layer.Find(identifier) if Sdf.Layer.IsAnonymousLayerIdentifier(identifier) else None
+    return str(layer.customLayerData.get(_SOURCE, "")) if layer else ""
+
+
 def named_files(document: mx.Document, resolved: str) -> list[str]:
-    """Resolved paths of the images that a document names, and of the documents that it includes."""
+    """Paths of the images that a document names, tile by tile, and of the documents that it includes."""
     inputs = (element for element in document.traverseTree() if element.getCategory() == "input")
-    files = [_file(i, resolved) for i in inputs if i.getType() == "filename" and i.getValueString()]
-    return [*files, *(_anchored(uri, resolved) for uri in document.getReferencedSourceUris())]
+    images = [_file(i, resolved) for i in inputs if i.getType() == "filename" and i.getValueString()]
+    tiles = [tile for image in images for tile in _tiles(image)]
+    return [*tiles, *(_anchored(uri, resolved) for uri in document.getReferencedSourceUris())]
 
 
 class _Writer:
@@ -192,6 +201,12 @@ def _file(found: mx.Input, resolved: str) -> str:
     """With the file prefixes around it; without them where only that exists, as OpenUSD's plugin reads it."""
     prefixed, plain = (_anchored(name, resolved) for name in (found.getResolvedValueString(), found.getValueString()))
     return plain if prefixed != plain and not Ar.GetResolver().Resolve(prefixed) else prefixed
+
+
+def _tiles(image: str) -> list[str]:
+    if not UsdShade.UdimUtils.IsUdimIdentifier(image):
+        return [image]
+    return [path for path, _ in UsdShade.UdimUtils.ResolveUdimTilePaths(image, Sdf.Layer.CreateAnonymous())]
 
 
 def _anchored(name: str, resolved: str) -> str:

@@ -28,8 +28,6 @@ def supply_documents(stage: Usd.Stage) -> None:
 
     The layers are changed in memory alone. What cannot be read is logged, and stays a reference to nothing.
     """
-    if not any(is_about_documents(str(error)) for error in stage.GetCompositionErrors()):
-        return
     supplied: dict[str, Sdf.Layer | None] = {}
     try:
         for layer in stage.GetUsedLayers():

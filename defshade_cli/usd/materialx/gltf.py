@@ -16,6 +16,7 @@ def _translate(to: Translation) -> None:
     to.put("clearcoat_roughness", to["clearcoat_roughness"], "clearcoat_roughness")
     to.put_product("emissive_color", "emissive_strength", "emissive")
     to.put_normal("normal")
+    to.put_occlusion()
     _cover(to)
 
 
@@ -33,6 +34,7 @@ GLTF_PBR = Model(
         "metallic": 1.0,
         "roughness": 1.0,
         "normal": (0.0, 0.0, 1.0),
+        "occlusion": 1.0,
         "transmission": 0.0,
         "specular": 1.0,
         "specular_color": (1.0, 1.0, 1.0),

@@ -24,6 +24,6 @@ MODELS: dict[str, Model] = {
 }
 
 
-def translate(shader: UsdShade.Shader, identifier: str, network: Network) -> Translation:
-    """The shader's inputs as fields of a Material."""
-    return Translation(shader, network, MODELS[identifier]).run()
+def translate(shader: UsdShade.Shader, identifier: str, network: Network, *, occlusion: bool) -> Translation:
+    """The shader's inputs as fields of a Material.  occlusion: read it too."""
+    return Translation(shader, network, MODELS[identifier], occlusion).run()

@@ -23,6 +23,7 @@ def _translate(to: Translation) -> None:
     to.values["use_specular_workflow"] = bool(to["useSpecularWorkflow"].bias.any())
     to.values["opacity_mode"] = "presence" if to["opacityMode"].bias.any() else "transparent"
     to.put_normal("normal")
+    to.put_occlusion()
 
 
 PREVIEW_SURFACE = Model(
@@ -40,6 +41,7 @@ PREVIEW_SURFACE = Model(
         "opacityThreshold": 0.0,
         "ior": 1.5,
         "normal": (0.0, 0.0, 1.0),
+        "occlusion": 1.0,
     },
     left_out={"displacement": (0.0, "")},
     translate=_translate,

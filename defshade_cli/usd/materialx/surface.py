@@ -39,12 +39,14 @@ class Model:
 class Translation:
     """From one shader's inputs to the fields of a Material. Nothing raises: what cannot be said is lost, and named.
 
+    occlusion: is it to be read?
     values: constants by field.  textures: what replaces them.  lost: inputs of the shader, with reasons.
     """
 
     shader: UsdShade.Shader
     network: Network
     model: Model
+    occlusion: bool
     values: dict[str, Any] = field(default_factory=dict)
     textures: dict[str, TextureInput] = field(default_factory=dict)
     lost: dict[str, None] = field(default_factory=dict)
@@ -110,6 +112,10 @@ class Translation:
                 self.values["uses_display_color"] = True
                 return
         self.put_product("diffuse_color", weight, name) if weight else self.put("diffuse_color", self[name], name)
+
+    def put_occlusion(self) -> None:
+        if self.occlusion:
+            self.put("occlusion", self["occlusion"], "occlusion")
 
     def put_normal(self, name: str) -> None:
         """A normal in tangent space; a constant one that leans has no counterpart."""
