@@ -25,6 +25,8 @@ class Decision:
 def explain(plan: Plan) -> Iterator[Decision]:
     """Decision by decision, in the order of the pipeline."""
     yield Decision("layout", plan.layout, "as asked")
+    converted = "authored colours are converted to it"
+    yield Decision("render space", plan.render_space.name, "as authored" if plan.render_space.is_rec709 else converted)
     yield _explain_subdivision(plan)
     for plane in PLANES:
         yield _kept(f"plane {plane.name}", plane in plan.planes, "a material or layer needs it", "nothing needs it")
