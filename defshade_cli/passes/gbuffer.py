@@ -24,7 +24,7 @@ class GBuffer:
     planes: tuple[Plane, ...]
     layout: Layout
 
-    def bind(self, program: moderngl.Program, **others: moderngl.Texture | None) -> None:
+    def bind(self, program: moderngl.Program, **others: moderngl.Texture | moderngl.TextureArray | None) -> None:
         """Let `program` read the planes, and `others` by the names of their samplers, where it has those."""
         textures = {f"plane_{name}": texture for name, texture in self.target.textures.items()}
         bound = {**textures, "plane_depth": self.target.depth, **others}
@@ -57,8 +57,9 @@ class GBufferVariant:
     @property
     def defines(self) -> list[str]:
         flags = ["CUTOUT"] * self.cutout + ["DISPLAY_COLOR_VARIES"] * self.color_varies
-        flags += ["TEXTURES"] * bool(self.texture_groups)
-        return [plane.define for plane in self.planes] + flags + space_defines(self.space)
+        flags += ["TEXTURES", "POSITION"] * bool(self.texture_groups)
+        inputs = [name for plane in self.planes for name in plane.inputs]
+        return list(dict.fromkeys([plane.define for plane in self.planes] + flags + inputs)) + space_defines(self.space)
 
 
 class GBufferPass:
@@ -83,6 +84,6 @@ class GBufferPass:
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = "<" if standard else ">"
         draws.textures.bind(self._program)
-        vertex_array = self._context.vertex_array(self._program, list(draws.vertices), draws.indices)
+        vertex_array = self._context.vertex_array(self._program, draws.vertices_of(self._program), draws.indices)
         vertex_array.render_indirect(draws.commands)
         vertex_array.release()
