@@ -196,7 +196,7 @@ def _copies_of(content: Surface | Light) -> Copies:
 
 
 def _is_rigged_from_above(instance: Usd.Prim, here: Standing) -> bool:
-    """Is a SkelRoot above the instance? Then its skeletons may deform each instance otherwise, and it is no more one."""
+    """Is a SkelRoot above the instance? Its skeletons may deform each instance otherwise."""
     return here.rig is not None and here.rig.root != here.on_stage(instance)
 
 

@@ -21,7 +21,6 @@ from defshade_cli.usd.skel.influences import Influences, read_influences
 from defshade_cli.usd.skel.skinning import DualQuaternionBlend, LinearBlend, Skinning, inverse_transposes
 from defshade_cli.usd.xform import matrix
 
-
 T = TypeVar("T")
 
 Skin = tuple[Skinning, Influences, Matrix]
@@ -141,7 +140,7 @@ def moulded(polygons: Polygons, points: NDArray[np.float64], normals: NDArray[np
 
 
 def bent(polygons: Polygons, skinning: Skinning, influences: Influences, bind: Matrix) -> Polygons:
-    """Polygons moved from bind to skeleton space; normals that are one a face, or one for all, follow from the shape."""
+    """Polygons moved from bind to skeleton space; normals that no point has follow from the shape."""
     bound = polygons.points @ bind[:3, :3].T + bind[:3, 3]
     moved = replace(polygons, points=skinning.points(bound, influences).astype(np.float32))
     if moved.normals is None:

@@ -45,7 +45,7 @@ class Influences:
 
 
 def read_influences(query: UsdSkel.SkinningQuery, time: Usd.TimeCode, joint_count: int, count: int) -> Influences:
-    """Influences of `count` points, or one row of a rigid prim. Raises ValueError where what is authored fits neither."""
+    """Influences of `count` points, or one row of a rigid prim. Raises ValueError where none are authored that fit."""
     most = query.GetNumInfluencesPerComponent()
     authored = query.ComputeJointInfluences(time)
     if most < 1 or authored is None:
