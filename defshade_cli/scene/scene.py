@@ -35,6 +35,7 @@ class Scene:
     assets: path of a drawn prim → path of the component that it is part of; empty unless asked for.
     resolution, pixel_aspect, conform, data_window: of the stage's UsdRenderSettings, where it names one; the window
         is (xmin, ymin, xmax, ymax), 0..1 over the image, y up.
+    rendering_space: the colour space that they name; None for linear Rec.709, in which a Scene's colours are.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Scene:
     assets: Mapping[str, str] = field(default_factory=dict)
     conform: ConformPolicy = "expandAperture"
     data_window: tuple[float, float, float, float] = WHOLE_IMAGE
+    rendering_space: str | None = None
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:

@@ -116,6 +116,7 @@ class StageReader:
             conform=self._settings.conform,
             data_window=self._settings.data_window,
             assets=read_assets(self._stage, _paths(drawables)) if self._extras.assets else {},
+            rendering_space=self._settings.rendering_space,
         )
 
     def _read_camera(
