@@ -1,8 +1,8 @@
 """Cryptomatte 1.2: which names cover a pixel, and how much of it.
 
 A name's id is its MurmurHash3 read as a float. A pixel holds (id, coverage) pairs in ranks, the greatest coverage
-first. Friedman & Jones 2015, "Fully Automatic ID Mattes with Support for Motion Blur and Transparency"; the specification:
-github.com/Psyop/Cryptomatte.
+first. Friedman & Jones 2015, "Fully Automatic ID Mattes with Support for Motion Blur and Transparency";
+the specification: github.com/Psyop/Cryptomatte.
 """
 
 from __future__ import annotations
