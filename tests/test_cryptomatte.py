@@ -217,4 +217,4 @@ def Xform "Set" (kind = "assembly") {
 """)
     film = render(stage, size=(32, 16), layers=("cryptoAsset", "cryptoObject"))
     assert set(film.manifests["cryptoAsset"].values()) == {"/Set/Chair", "/Set"}
-    assert "/Set/Chair/seat" in film.manifests["cryptoObject"].values()
+    assert "/Set/Chair/parts/leg" in film.manifests["cryptoObject"].values()
