@@ -13,6 +13,9 @@ in vec4 display_color;
 flat in uint material_index;
 flat in uint instance_index;
 flat in float handedness;
+#ifdef PLANE_LINKS
+flat in uint link_set;
+#endif
 #ifdef POSITION
 in vec3 position_relative;
 #endif
@@ -26,6 +29,9 @@ in vec2 layer_uv;
 Surface surface_of(Material material, vec3 normal) {
     Surface s;
     s.normal = normal;
+#ifdef PLANE_LINKS
+    s.link_set = link_set;
+#endif
     s.base = material.diffuse_color;
     s.metallic = material.metallic;
     s.roughness = material.roughness;
