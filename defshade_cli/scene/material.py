@@ -34,6 +34,7 @@ class Material:
 
     uses_display_color: diffuse_color and opacity come from the drawable's displayColor and displayOpacity:
         the material of a prim that has none bound, or a displayColor reader.
+    one_sided: not seen from behind; only for materials whose opacity is textured, as the cards of draw modes are.
     inputs: the textures, by the name of the field in TEXTURED_FIELDS that they replace.
     """
 
@@ -51,6 +52,7 @@ class Material:
     opacity_mode: Literal["transparent", "presence"] = "transparent"
     ior: float = 1.5
     uses_display_color: bool = False
+    one_sided: bool = False
     inputs: Mapping[str, TextureInput] = field(default_factory=dict, hash=False)
 
     @property

@@ -26,11 +26,16 @@ from defshade_cli.usd.xform import IDENTITY
 
 
 class Standing(NamedTuple):
-    """What a prim hands down. in_world: root_from_prim leads to world space, because an xform stack was reset."""
+    """What a prim hands down.
+
+    in_world: root_from_prim leads to world space, because an xform stack was reset.
+    draw_mode: of the models below; None below what is no model, where there are no others.
+    """
 
     root_from_prim: Gf.Matrix4d = IDENTITY
     in_world: bool = False
     purpose: str | None = None
+    draw_mode: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
