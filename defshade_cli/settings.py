@@ -11,6 +11,7 @@ Layout = Literal["rgba8", "packed", "float"]
 Shading = Literal["preview-surface", "classic"]
 Existing = Literal["overwrite", "skip", "error"]
 Complexity = Literal["auto", "low", "medium", "high", "veryhigh"]
+Filter = Literal["box", "gaussian", "blackman-harris"]
 Payloads = Literal["all", "none"]
 Compression = Literal["zip", "zips", "piz", "dwaa", "none"]
 Bits = Literal[8, 16]
@@ -21,6 +22,8 @@ EXISTING: tuple[Existing, ...] = ("overwrite", "skip", "error")
 COMPLEXITIES: tuple[Complexity, ...] = ("auto", "low", "medium", "high", "veryhigh")
 PAYLOADS: tuple[Payloads, ...] = ("all", "none")
 COMPRESSIONS: tuple[Compression, ...] = ("zip", "zips", "piz", "dwaa", "none")
+FILTERS: dict[Filter, float] = {"box": 1.0, "gaussian": 2.0, "blackman-harris": 3.0}
+"""Widths in pixels, from end to end, where none is asked: those of Arnold."""
 BITS: tuple[Bits, ...] = (8, 16)
 PURPOSES = ("default", "render", "proxy", "guide")
 
@@ -78,7 +81,10 @@ class RenderSettings:
 
     size: (width, height) in pixels; None follows the stage's RenderSettings, then 1920x1080.
     width: pixels; the height then follows the camera's aspect. At most one of size and width is given.
+    crop: (x, y, width, height) of the pixels that are rendered, from the image's top left corner, which they may leave;
+        None follows the stage's RenderSettings, then the whole image.
     samples: jittered samples a pixel; 1 is a sample at the pixel's centre.
+    filter: the samples of a pixel fall by it.  filter_width: pixels from end to end; None for the filter's own.
     exposure: stops added to the camera's own.
     shadows: False lights every surface that faces a light.
     complexity: how finely subdivision surfaces are refined: by their size in the image, or 0 to 3 levels all alike.
@@ -88,7 +94,10 @@ class RenderSettings:
 
     size: tuple[int, int] | None = None
     width: int | None = None
+    crop: tuple[int, int, int, int] | None = None
     samples: int = 1
+    filter: Filter = "box"
+    filter_width: float | None = None
     layout: Layout = "float"
     shading: Shading = "preview-surface"
     layers: tuple[str, ...] = ("beauty",)

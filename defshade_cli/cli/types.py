@@ -13,6 +13,9 @@ import click
 from defshade_cli.errors import UsageError
 from defshade_cli.settings import VariantChoice
 
+Region = tuple[int, int, int, int]
+"""(x, y, width, height) in pixels."""
+
 
 class Size(click.ParamType):
     """`1920x1080` → (1920, 1080)."""
@@ -24,6 +27,26 @@ class Size(click.ParamType):
         if not match:
             self.fail(f"{value!r} is not a size in pixels such as 1920x1080", param, ctx)
         return int(match[1]), int(match[2])
+
+    def text(self, value: tuple[int, int]) -> str:
+        return f"{value[0]}x{value[1]}"
+
+
+class Crop(click.ParamType):
+    """`640x360+100-20` → (100, -20, 640, 360), as oiiotool writes regions."""
+
+    name = "WxH+X+Y"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Region:
+        match = re.fullmatch(r"([1-9]\d*)x([1-9]\d*)([+-]\d+)([+-]\d+)", value)
+        if not match:
+            self.fail(f"{value!r} is not a part of the image such as 640x360+100+50", param, ctx)
+        width, height, x, y = map(int, match.groups())
+        return x, y, width, height
+
+    def text(self, value: Region) -> str:
+        x, y, width, height = value
+        return f"{width}x{height}{x:+d}{y:+d}"
 
 
 class Finite(click.ParamType):
@@ -38,6 +61,16 @@ class Finite(click.ParamType):
             number = math.nan
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a finite number", param, ctx)
+        return number
+
+
+class Positive(Finite):
+    """A finite float above 0."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        number = super().convert(value, param, ctx)
+        if number <= 0.0:
+            self.fail(f"{value!r} is not above 0", param, ctx)
         return number
 
 

@@ -56,7 +56,9 @@ class Pipeline:
             layers |= data_layers(self._data_planes(draws, plan), plan)
         return Film(
             layers={name: layers[name] for name in plan.layers},
-            camera=plan.camera,
+            camera=plan.display_camera,
+            origin=plan.window.origin,
+            display=plan.display,
             scene_name=scene.name,
             frame=scene.frame,
             frames_per_second=scene.frames_per_second,
@@ -73,7 +75,7 @@ class Pipeline:
         radiance = self._frame.radiance("sample", plan.size, gbuffer)
         total = self._frame.radiance("total", plan.size) if plan.samples > 1 else radiance
         total.framebuffer.clear()
-        for sample in samples(plan.samples):
+        for sample in samples(plan.samples, plan.filter, plan.filter_width):
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             self._light(draws, scene, plan, sample, gbuffer, radiance)
             if plan.samples > 1:

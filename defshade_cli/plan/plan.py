@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -16,7 +16,8 @@ from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
-from defshade_cli.settings import Complexity, Layout, RenderSettings, Shading
+from defshade_cli.scene.window import DataWindow, from_ndc
+from defshade_cli.settings import FILTERS, Complexity, Filter, Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
 from defshade_cli.units import exposure_scale
 
@@ -27,8 +28,11 @@ _MARGIN = 1e-3  # relative slack around bounds that float32 may round outwards
 class Plan:
     """All that the passes read beside the Scene.
 
-    camera: conformed to the image.  clip: (near, far), the camera's range tightened to the geometry.
+    display, display_camera: the whole image, and the camera conformed to it.
+    window: the part of it that is rendered; size and camera are its own.
+    clip: (near, far), the camera's range tightened to the geometry.
     exposure: linear, the camera's and the settings' together.
+    filter_width: pixels.
     planes: of the GBuffer; lights: sorted quads, spheres, cones.
     shadows: some light casts them.  background: domes are seen where no geometry is.
     cutout: some opacity may be below 1.  textures: some material reads them.
@@ -36,13 +40,17 @@ class Plan:
     levels: how often subdivision surfaces were refined, ascending; empty without any.
     """
 
-    size: tuple[int, int]
+    display: tuple[int, int]
+    display_camera: Camera
+    window: DataWindow
     camera: Camera
     clip: tuple[float, float]
     exposure: float
     layout: Layout
     shading: Shading
     samples: int
+    filter: Filter
+    filter_width: float
     layers: tuple[str, ...]
     planes: tuple[Plane, ...]
     lights: tuple[PlannedLight, ...]
@@ -53,6 +61,11 @@ class Plan:
     data_pass: bool
     complexity: Complexity
     levels: tuple[int, ...]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) of what is rendered, in pixels."""
+        return self.window.size
 
     @property
     def lit(self) -> bool:
@@ -86,8 +99,10 @@ class Plan:
 def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     """Decide. Raises UsageError for a layer that does not exist or an image without pixels."""
     _check_layers(settings.layers)
-    size = image_size(scene.camera.aspect, settings.size, settings.width, scene.resolution)
-    camera = scene.camera.conformed(size[0] * scene.pixel_aspect / size[1], scene.conform)
+    display = image_size(scene.camera.aspect, settings.size, settings.width, scene.resolution)
+    display_camera = scene.camera.conformed(display[0] * scene.pixel_aspect / display[1], scene.conform)
+    window = DataWindow(*settings.crop) if settings.crop else from_ndc(scene.data_window, display)
+    camera = replace(display_camera, window=window.of(display_camera.window, display))
     exposure = camera.exposure * exposure_scale(settings.exposure)
     lights = plan_lights(scene, exposure, settings)
     planes = needed_planes(scene.materials, settings.layers)
@@ -96,13 +111,17 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     data_layers = [name for name in settings.layers if LAYERS[name].source != "lighting"]
     data_pass = bool(data_layers) and (settings.layout != "float" or settings.samples > 1 or cutout)
     return Plan(
-        size=size,
+        display=display,
+        display_camera=display_camera,
+        window=window,
         camera=camera,
         clip=_tight_clip(camera, scene.bounds),
         exposure=exposure,
         layout=settings.layout,
         shading=settings.shading,
         samples=settings.samples,
+        filter=settings.filter,
+        filter_width=settings.filter_width or FILTERS[settings.filter],
         layers=settings.layers,
         planes=planes,
         lights=lights,

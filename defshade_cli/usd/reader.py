@@ -58,7 +58,7 @@ class StageReader:
         self._tessellation = Tessellation()
         self._settings = read_settings(stage)
         self._cameras = find_cameras(stage)
-        self._issues = (*(arc.unsupported for arc in find_unresolved(stage)), *self._settings.issues)
+        self._issues = tuple(arc.unsupported for arc in find_unresolved(stage))
         self._camera = choose_camera(stage, self._cameras, camera, self._settings.camera)
 
     @property
@@ -109,6 +109,7 @@ class StageReader:
             resolution=self._settings.resolution,
             pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
+            data_window=self._settings.data_window,
         )
 
     def _read_camera(
