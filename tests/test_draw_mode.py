@@ -151,6 +151,11 @@ def test_textures_lie_on_cards_as_in_hydra(
     np.testing.assert_array_equal(mesh.uvs["cardsUv"][corner], texel)
 
 
+def test_cards_placed_by_their_textures_are_reported() -> None:
+    (issue,) = read(model(mode("cards") + 'uniform token model:cardGeometry = "fromTexture"')).unsupported
+    assert issue.reason == "cardGeometry fromTexture: its cards are crossed inside the bounds"
+
+
 def test_a_card_without_its_file_is_reported() -> None:
     scene = read(model(mode("cards") + card("XPos", "gone.png")))
     assert [(i.path, i.reason) for i in scene.unsupported] == [("/model.model:cardTextureXPos", "no file gone.png")]
