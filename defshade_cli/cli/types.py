@@ -122,6 +122,21 @@ class Names(click.ParamType):
         return tuple(dict.fromkeys(names))
 
 
+class Layers(click.ParamType):
+    """Names of layers, ours or another renderer's, separated by commas → ours; `all` for every one of the table."""
+
+    name = "a,b,c"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
+        from defshade_cli.image.layers import resolve
+
+        names = [name.strip() for name in value.split(",")] if isinstance(value, str) else value
+        try:
+            return resolve(names)
+        except UsageError as error:
+            self.fail(str(error), param, ctx)
+
+
 class Variant(click.ParamType):
     """`/Car{color=red}` → VariantChoice."""
 

@@ -169,8 +169,7 @@ class ShadowPass:
         self._write_commands(np.concatenate(commands))
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = ">"
-        vertices = [part for part in draws.vertices if any(name in self._program for name in part[2:])]
-        array = self._context.vertex_array(self._program, vertices, draws.indices)
+        array = self._context.vertex_array(self._program, draws.vertices_of(self._program), draws.indices)
         first = 0
         for tile, (row, seen) in enumerate(zip(records, commands, strict=True)):
             x, y = tile % TILES, tile // TILES

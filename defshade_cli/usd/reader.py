@@ -11,6 +11,7 @@ from pxr import Usd
 
 from defshade_cli.errors import EmptyStage
 from defshade_cli.scene.camera import Camera, image_size
+from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import UNBOUND
@@ -39,6 +40,7 @@ class StageReader:
 
     camera: path or name; without it the rule of usd/camera.py picks.  purposes: of the geometry that is drawn.
     complexity: of subdivision surfaces; for `auto` it matters how large the image is, see scene.camera.image_size.
+    extras: what only some layers need.
     Raises PrimNotFound for a camera that the stage lacks.
     """
 
@@ -51,10 +53,11 @@ class StageReader:
         complexity: Complexity = "auto",
         size: tuple[int, int] | None = None,
         width: int | None = None,
+        extras: Extras = NO_EXTRAS,
     ) -> None:
         self._stage, self._purposes = stage, tuple(purposes)
         self._complexity, self._size, self._width = complexity, size, width
-        self._memory = Memory(stage)
+        self._memory = Memory(stage, extras)
         self._tessellation = Tessellation()
         self._settings = read_settings(stage)
         self._cameras = find_cameras(stage)

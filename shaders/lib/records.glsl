@@ -34,6 +34,7 @@ struct Material {
     uint one_sided;
     uint first_input;          // of its textures
     uint input_count;
+    float occlusion;
 };
 
 struct TextureInput {

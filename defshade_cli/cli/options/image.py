@@ -10,8 +10,7 @@ import click
 from defshade_cli import settings
 from defshade_cli.cli.options.option import Function, Option
 from defshade_cli.cli.options.sampling import sampling_options
-from defshade_cli.cli.types import Crop, Finite, Names, Size
-from defshade_cli.image.layers import LAYERS
+from defshade_cli.cli.types import Crop, Finite, Layers, Size
 from defshade_cli.settings import RenderSettings
 
 _RENDER = RenderSettings()
@@ -42,11 +41,12 @@ def image_options(layers: Sequence[str]) -> list[Function]:
         ),
         option(
             "--layers",
-            type=Names("layer", tuple(LAYERS)),
+            type=Layers(),
             metavar="NAMES",
             default=tuple(layers),
             default_text=",".join(layers),
-            help="Layers to write, with commas between, of those listed below; or 'all'.",
+            help="Layers to write, with commas between, of those listed below or by their names in Hydra, "
+            "Arnold and Blender; 'all' for all that are listed.",
         ),
         *sampling_options(),
         *_shading_options(),
