@@ -22,7 +22,7 @@ class GBuffer:
     planes: tuple[Plane, ...]
     layout: Layout
 
-    def bind(self, program: moderngl.Program, **others: moderngl.Texture | None) -> None:
+    def bind(self, program: moderngl.Program, **others: moderngl.Texture | moderngl.TextureArray | None) -> None:
         """Let `program` read the planes, and `others` by the names of their samplers, where it has those."""
         textures = {f"plane_{name}": texture for name, texture in self.target.textures.items()}
         bound = {**textures, "plane_depth": self.target.depth, **others}

@@ -18,6 +18,7 @@ from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
 from defshade_cli.passes.lighting import LightingPass, LightingVariant, light_records
+from defshade_cli.passes.profiles import ProfileTables
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
 from defshade_cli.passes.shadows import ShadowPass
@@ -44,6 +45,7 @@ class Pipeline:
                 gpu, cutout=cutout, color_varies=color_varies, texture_groups=texture_groups
             )
         )
+        self._profiles = ProfileTables(gpu)
         self._accumulation = AccumulationPass(gpu)
 
     def render(self, scene: Scene, plan: Plan) -> Film:
@@ -93,14 +95,15 @@ class Pipeline:
         lighting.begin(gbuffer, radiance)
         for dome in plan.domes:
             self._environment_pass(EnvironmentVariant.of(plan)).draw(dome, gbuffer, radiance)
+        profiles = self._profiles.update(plan.profiles)
         for batch in light_batches(scene, plan, sample) if plan.lit else ():
             shadows = None
             if plan.shadows:
                 shadow_pass = self._shadow_pass(plan.cutout, draws.color_varies, draws.texture_groups)
                 shadows = shadow_pass.draw(draws, [lit.shadow_cameras for lit in batch], sample.texel_offset)
             lights, emitters = [lit.planned for lit in batch], [lit.emitter for lit in batch]
-            self._lights.write(light_records(lights, emitters, plan.camera.position, shadows))
-            lighting.add(lights, gbuffer, radiance, shadows)
+            self._lights.write(light_records(lights, emitters, plan.camera.position, shadows, plan.profiles))
+            lighting.add(lights, gbuffer, radiance, shadows, profiles)
 
     def _data_planes(self, draws: DrawList, plan: Plan) -> Planes:
         """Planes for the data layers: the beauty's own where it drew them in float at the pixels' centres.

@@ -13,6 +13,7 @@ from defshade_cli.image.layers import LAYERS, resolve
 from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
 from defshade_cli.scene.camera import Camera, image_size
+from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.window import DataWindow, from_ndc
@@ -90,6 +91,12 @@ class Plan:
     @property
     def domes(self) -> tuple[DomeLight, ...]:
         return tuple(planned.light for planned in self.lights if isinstance(planned.light, DomeLight))
+
+    @property
+    def profiles(self) -> tuple[IesProfile, ...]:
+        """The IES profiles of the lights, each once."""
+        shapings = [planned.light.shaping for planned in self.lights]
+        return tuple(dict.fromkeys(shaping.ies for shaping in shapings if shaping and shaping.ies))
 
     @property
     def volumes(self) -> tuple[Volume, ...]:
