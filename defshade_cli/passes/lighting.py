@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 from defshade_cli.gpu.context import DEPTH_CLAMP, Gpu
 from defshade_cli.gpu.planes import Plane, read_source, uses_standard_depth
 from defshade_cli.gpu.records import record
+from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.targets import Target
+from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.shadows import ShadowAtlas
 from defshade_cli.passes.volumes import cone_volume, sphere_volume
@@ -44,18 +46,27 @@ class LightingVariant:
     shadows: bool
     ies: bool
     volumes: tuple[Volume, ...]
+    space: RenderSpace = REC709
 
     @classmethod
     def of(cls, plan: Plan) -> LightingVariant:
         orthographic = plan.camera.projection == "orthographic"
         return cls(
-            plan.planes, plan.layout, plan.shading, orthographic, plan.shadows, bool(plan.profiles), plan.volumes
+            plan.planes,
+            plan.layout,
+            plan.shading,
+            orthographic,
+            plan.shadows,
+            bool(plan.profiles),
+            plan.volumes,
+            plan.render_space,
         )
 
     @property
     def defines(self) -> list[str]:
         flags = ["CLASSIC"] * (self.shading == "classic") + ["ORTHOGRAPHIC"] * self.orthographic
-        return [plane.define for plane in self.planes] + flags + ["SHADOWS"] * self.shadows + ["IES"] * self.ies
+        flags += ["SHADOWS"] * self.shadows + ["IES"] * self.ies + space_defines(self.space)
+        return [plane.define for plane in self.planes] + flags
 
 
 class LightingPass:

@@ -62,6 +62,7 @@ class Pipeline:
             camera=plan.display_camera,
             origin=plan.window.origin,
             display=plan.display,
+            render_space=plan.render_space,
             scene_name=scene.name,
             frame=scene.frame,
             frames_per_second=scene.frames_per_second,
@@ -124,5 +125,7 @@ class Pipeline:
 
     def _draw_gbuffer(self, draws: DrawList, plan: Plan, gbuffer: GBuffer, sample: Sample) -> None:
         self._view.write(view_record(plan, gbuffer.layout, sample))
-        variant = GBufferVariant(gbuffer.planes, gbuffer.layout, plan.cutout, draws.color_varies, draws.texture_groups)
+        variant = GBufferVariant(
+            gbuffer.planes, gbuffer.layout, plan.cutout, draws.color_varies, draws.texture_groups, plan.render_space
+        )
         self._gbuffer_pass(variant).draw(draws, gbuffer)

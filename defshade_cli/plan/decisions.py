@@ -24,6 +24,8 @@ class Decision:
 def explain(plan: Plan) -> Iterator[Decision]:
     """Decision by decision, in the order of the pipeline."""
     yield Decision("layout", plan.layout, "as asked")
+    converted = "authored colours are converted to it"
+    yield Decision("render space", plan.render_space.name, "as authored" if plan.render_space.is_rec709 else converted)
     yield _explain_subdivision(plan)
     for plane in PLANES:
         kept = plane in plan.planes or plane in plan.data_planes
