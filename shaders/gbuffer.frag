@@ -66,15 +66,15 @@ Detail detail_of(vec3 normal) {
 
 void main() {
     Material material = material_at(material_index, display_color);
+    float side = gl_FrontFacing ? handedness : -handedness;
     vec3 normal = normalize(normal_relative);
     Detail detail = detail_of(normal);
 #ifdef TEXTURES
     apply_textures(material, normal, position_relative, uv);
 #endif
 #ifdef CUTOUT
-    if (is_cut_out(material, instance_index)) discard;
+    if (is_cut_out(material, instance_index) || (material.one_sided != 0u && side < 0.0)) discard;
 #endif
-    float side = gl_FrontFacing ? handedness : -handedness;
     detail.occlusion = material.occlusion;
     write_planes(surface_of(material, side * normal), detail);
 }
