@@ -33,7 +33,7 @@ void main() {
     vec3 irradiance = irradiance_from(lights[light_index], position, l);
     if (irradiance == vec3(0.0)) discard;
     Surface surface = read_planes(pixel);
-    irradiance *= visibility(lights[light_index], position, surface.normal, l);
+    irradiance *= visibility(lights[light_index], position, l);
     float widening = patch_alpha_squared(lights[light_index], position, l);
     if (widening > 0.0) {
         surface.roughness = widened_roughness(surface.roughness, widening);

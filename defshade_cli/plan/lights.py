@@ -18,7 +18,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.scene.light import DistantLight, Light
+from defshade_cli.plan.overlap import reaches_into_ball
+from defshade_cli.scene.light import DistantLight, Light, SphereLight
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderSettings, Shading
@@ -31,11 +32,15 @@ _MIN_ALPHA = 1e-4  # shaders/lib/constants.glsl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedLight:
-    """reach: radius of the volume in scene units, infinite for a quad."""
+    """reach: radius of the volume in scene units, infinite for a quad.
+
+    is_empty: no geometry lies within a sphere light.
+    """
 
     light: Light
     volume: Volume
     reach: float
+    is_empty: bool = True
 
 
 def volume_of(light: Light) -> Volume:
@@ -51,7 +56,10 @@ def plan_lights(scene: Scene, exposure: float, settings: RenderSettings) -> tupl
     share = settings.light_tolerance / max(len(lit), 1)
     order: dict[str, int] = {"quad": 0, "sphere": 1, "cone": 2}
     planned = [
-        PlannedLight(light, volume_of(light), _reach(light, scene.bounds, exposure * response / share)) for light in lit
+        PlannedLight(
+            light, volume_of(light), _reach(light, scene.bounds, exposure * response / share), _is_empty(light, scene)
+        )
+        for light in lit
     ]
     return tuple(sorted(planned, key=lambda p: order[p.volume]))
 
@@ -80,3 +88,9 @@ def _reach(light: Light, bounds: NDArray[np.float64], gain: float) -> float:
     farthest = np.max(np.abs(bounds - light.position), axis=0)
     geometry = float(np.linalg.norm(farthest)) * (1.0 + _MARGIN)
     return min(math.sqrt(_peak(light) * gain), geometry)
+
+
+def _is_empty(light: Light, scene: Scene) -> bool:
+    if not isinstance(light, SphereLight) or light.treat_as_point:
+        return True
+    return not reaches_into_ball(scene, light.position, light.world_radius)
