@@ -17,10 +17,12 @@ from defshade_cli.farm.targets import FINGERPRINT, check_outputs, frame_files, f
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.files import write
 from defshade_cli.image.film import Film
+from defshade_cli.image.layers import resolve
+from defshade_cli.image.layers.extras import extras_of
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import Plan, make_plan
 from defshade_cli.scene.scene import Scene
-from defshade_cli.settings import RenderJob, RenderSettings
+from defshade_cli.settings import Composition, RenderJob, RenderSettings
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.stage import open_stage
 
@@ -82,7 +84,7 @@ def run(job: RenderJob, *, command: str = "", renderer: Renderer | None = None) 
     frames = job.frames or (reader.first_frame(),)
     check_outputs(job, frames, reader.camera_name)
     remove_leftovers(job, frames, reader.camera_name)
-    provenance = {"version": __version__, "command": command, "stage": job.stage.name}
+    provenance = {"version": __version__, "command": command, "stage": job.stage.name} | job.composition.choices
     fingerprint = Fingerprint(job)
     with nullcontext(renderer) if renderer else Renderer() as lent:
         for frame in frames:
@@ -103,18 +105,29 @@ def examine(job: RenderJob) -> tuple[Scene, Plan]:
     return scene, make_plan(scene, job.settings)
 
 
-def render(stage: str | Path, *, camera: str | None = None, frame: float | None = None, **options: Any) -> Film:
+def render(
+    stage: str | Path,
+    *,
+    camera: str | None = None,
+    frame: float | None = None,
+    composition: Composition | None = None,
+    **options: Any,
+) -> Film:
     """Render one frame of a stage in memory.
 
+    composition: variants, mask, session layers and payloads of the stage.
     options: fields of RenderSettings, e.g. size=(640, 360), samples=16, layers=("beauty", "depth").
     Raises UsageError for an unknown option, StageError, GpuError.
     """
     known = {f.name for f in fields(RenderSettings)}
     if unknown := sorted(options.keys() - known):
         raise UsageError(f"no render option named {', '.join(unknown)}; there are {', '.join(sorted(known))}")
-    job = RenderJob(Path(stage), (frame,) if frame is not None else (), camera, RenderSettings(**options))
-    with closing(run(job)) as frames:
-        result = next(frames)
+    settings = RenderSettings(**options)
+    settings = replace(settings, layers=resolve(settings.layers))
+    frames = (frame,) if frame is not None else ()
+    job = RenderJob(Path(stage), frames, camera, composition or Composition(), settings)
+    with closing(run(job)) as results:
+        result = next(results)
     assert result.film is not None
     return result.film
 
@@ -122,12 +135,13 @@ def render(stage: str | Path, *, camera: str | None = None, frame: float | None 
 def _reader(job: RenderJob) -> StageReader:
     settings = job.settings
     return StageReader(
-        open_stage(job.stage),
+        open_stage(job.stage, job.composition, job.camera),
         camera=job.camera,
         purposes=settings.purposes,
         complexity=settings.complexity,
         size=settings.size,
         width=settings.width,
+        extras=extras_of(settings.layers),
     )
 
 

@@ -2,22 +2,77 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import re
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
 Layout = Literal["rgba8", "packed", "float"]
 Shading = Literal["preview-surface", "classic"]
 Existing = Literal["overwrite", "skip", "error"]
 Complexity = Literal["auto", "low", "medium", "high", "veryhigh"]
+Filter = Literal["box", "gaussian", "blackman-harris"]
+Payloads = Literal["all", "none"]
 Compression = Literal["zip", "zips", "piz", "dwaa", "none"]
+Bits = Literal[8, 16]
 
 LAYOUTS: tuple[Layout, ...] = ("rgba8", "packed", "float")
 SHADINGS: tuple[Shading, ...] = ("preview-surface", "classic")
 EXISTING: tuple[Existing, ...] = ("overwrite", "skip", "error")
 COMPLEXITIES: tuple[Complexity, ...] = ("auto", "low", "medium", "high", "veryhigh")
+PAYLOADS: tuple[Payloads, ...] = ("all", "none")
 COMPRESSIONS: tuple[Compression, ...] = ("zip", "zips", "piz", "dwaa", "none")
+FILTERS: dict[Filter, float] = {"box": 1.0, "gaussian": 2.0, "blackman-harris": 3.0}
+"""Widths in pixels, from end to end, where none is asked: those of Arnold."""
+BITS: tuple[Bits, ...] = (8, 16)
 PURPOSES = ("default", "render", "proxy", "guide")
+
+
+@dataclass(frozen=True, slots=True)
+class VariantChoice:
+    """A variant of a set of a prim, written as in Sdf paths: /Prim{set=variant}. An empty one switches the set off."""
+
+    prim: str
+    set: str
+    variant: str
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Raises ValueError for text that does not name a prim, a set and a variant."""
+        match = re.fullmatch(r"(/[^{}]*)\{([^{}=]+)=([^{}=]*)\}", text.strip())
+        if not match:
+            raise ValueError(f"{text!r} does not choose a variant as '/Prim{{set=variant}}' does")
+        return cls(*match.groups())
+
+    def __str__(self) -> str:
+        return f"{self.prim}{{{self.set}={self.variant}}}"
+
+
+@dataclass(frozen=True, slots=True)
+class Composition:
+    """What a stage is composed of, beyond what its file says.
+
+    session_layers: USD files over the stage, the strongest first.
+    variants: chosen over them all, in order: a variant may bring the sets that later ones are of.
+    mask: paths of the prims to which the stage is limited, see usd/mask.py; empty for no limit.
+    payloads: whether the stage's payloads are loaded.
+    """
+
+    session_layers: tuple[Path, ...] = ()
+    variants: tuple[VariantChoice, ...] = ()
+    mask: tuple[str, ...] = ()
+    payloads: Payloads = "all"
+
+    @property
+    def choices(self) -> dict[str, str]:
+        """What is not the default, as text by the names of the fields; layers without their folders."""
+        texts = {
+            "session_layers": ", ".join(path.name for path in self.session_layers),
+            "variants": " ".join(map(str, self.variants)),
+            "mask": ", ".join(self.mask),
+            "payloads": self.payloads,
+        }
+        return {f.name: texts[f.name] for f in fields(self) if getattr(self, f.name) != f.default}
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +81,10 @@ class RenderSettings:
 
     size: (width, height) in pixels; None follows the stage's RenderSettings, then 1920x1080.
     width: pixels; the height then follows the camera's aspect. At most one of size and width is given.
+    crop: (x, y, width, height) of the pixels that are rendered, from the image's top left corner, which they may leave;
+        None follows the stage's RenderSettings, then the whole image.
     samples: jittered samples a pixel; 1 is a sample at the pixel's centre.
+    filter: the samples of a pixel fall by it.  filter_width: pixels from end to end; None for the filter's own.
     exposure: stops added to the camera's own.
     shadows: False lights every surface that faces a light.
     complexity: how finely subdivision surfaces are refined: by their size in the image, or 0 to 3 levels all alike.
@@ -36,7 +94,10 @@ class RenderSettings:
 
     size: tuple[int, int] | None = None
     width: int | None = None
+    crop: tuple[int, int, int, int] | None = None
     samples: int = 1
+    filter: Filter = "box"
+    filter_width: float | None = None
     layout: Layout = "float"
     shading: Shading = "preview-surface"
     layers: tuple[str, ...] = ("beauty",)
@@ -55,6 +116,9 @@ class OutputSettings:
     patterns: file names with frame and name tokens; the suffix picks the format. One file per pattern and frame.
     display, view: of the OCIO config, for display-referred formats; None takes the config's default.
     full_float: 32-bit channels in EXR in place of half (data layers are always 32-bit).
+    multipart: a part of the EXR for each layer.  tiled: EXR in tiles; mipmaps: in tiles with all smaller levels.
+    bits: a channel of a picture; None takes the format's default.  dither: 8-bit colours, against banding.
+    verify: read each file back and compare, before it takes its name.
     """
 
     patterns: tuple[str, ...] = ()
@@ -64,6 +128,12 @@ class OutputSettings:
     full_float: bool = False
     compression: Compression = "zip"
     split_layers: bool = False
+    multipart: bool = False
+    tiled: bool = False
+    mipmaps: bool = False
+    bits: Bits | None = None
+    dither: bool = False
+    verify: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +148,7 @@ class RenderJob:
     stage: Path
     frames: tuple[float | None, ...] = ()
     camera: str | None = None
+    composition: Composition = field(default_factory=Composition)
     settings: RenderSettings = field(default_factory=RenderSettings)
     output: OutputSettings = field(default_factory=OutputSettings)
     device: int | None = None

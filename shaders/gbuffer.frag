@@ -1,6 +1,7 @@
 #include "lib/view.glsl"
 #include "lib/surface.glsl"
 #include "lib/cutout.glsl"
+#include "lib/detail.glsl"
 #include "lib/material.glsl"
 #ifdef TEXTURES
 #include "lib/texture.glsl"
@@ -12,9 +13,14 @@ in vec4 display_color;
 flat in uint material_index;
 flat in uint instance_index;
 flat in float handedness;
-#ifdef TEXTURES
+#ifdef POSITION
 in vec3 position_relative;
+#endif
+#ifdef TEXTURES
 in vec4 uv;
+#endif
+#ifdef LAYER_UV
+in vec2 layer_uv;
 #endif
 
 Surface surface_of(Material material, vec3 normal) {
@@ -35,9 +41,26 @@ Surface surface_of(Material material, vec3 normal) {
     return s;
 }
 
+// Before any branch, because of the derivatives.
+Detail detail_of(vec3 normal) {
+    Detail d;
+#ifdef PLANE_FACET
+    d.facet = facet_normal(dFdx(position_relative), dFdy(position_relative));
+#endif
+#ifdef LAYER_UV
+    d.uv = layer_uv;
+#endif
+#ifdef PLANE_TANGENT
+    Coordinates c = Coordinates(layer_uv, dFdx(layer_uv), dFdy(layer_uv));
+    d.tangent = tangent_across(normal, along_coordinates(dFdx(position_relative), dFdy(position_relative), c)[0]);
+#endif
+    return d;
+}
+
 void main() {
     Material material = material_at(material_index, display_color);
     vec3 normal = normalize(normal_relative);
+    Detail detail = detail_of(normal);
 #ifdef TEXTURES
     apply_textures(material, normal, position_relative, uv);
 #endif
@@ -45,5 +68,6 @@ void main() {
     if (is_cut_out(material, instance_index)) discard;
 #endif
     float side = gl_FrontFacing ? handedness : -handedness;
-    write_planes(surface_of(material, side * normal));
+    detail.occlusion = material.occlusion;
+    write_planes(surface_of(material, side * normal), detail);
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -44,3 +45,8 @@ def film(*names: str, size: tuple[int, int] = (WIDTH, HEIGHT), **fields: Any) ->
     layers = {name: layer_values(name, size) for name in names or LAYERS}
     fields.setdefault("metadata", {"command": "defshade render a.usda", "stage hash": "0123abcd", "seconds": 1.5})
     return Film(layers, tilted_camera(), "kitchen", frame=12.0, samples=16, **fields)
+
+
+def with_beauty(values: NDArray) -> Film:
+    """A film of these pixels, (H, W, 3 or 4)."""
+    return replace(film("beauty"), layers={"beauty": np.asarray(values, np.float32)})

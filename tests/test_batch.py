@@ -22,7 +22,7 @@ from defshade_cli.errors import UsageError
 from defshade_cli.farm.batch import run_batch
 from defshade_cli.farm.local import LocalEngine
 from defshade_cli.farm.tasks import Chunk, Outcome, check_batch, chunk_size, failed, joined, make_chunks
-from defshade_cli.image.files import read
+from defshade_cli.image.reading import read
 from defshade_cli.resources import SCENES
 from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
 

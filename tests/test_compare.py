@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from defshade_cli.errors import OutputError, UsageError
-from defshade_cli.image import files
+from defshade_cli.image import files, reading
 from defshade_cli.image.compare import Comparison, compare, difference
 from defshade_cli.settings import OutputSettings
 from films import film
@@ -148,5 +148,5 @@ def test_flip_of_pictures_is_the_display_referred_one(tmp_path: Path) -> None:
     frames[1].layers["beauty"][...] *= 0.5
     a, b = (files.write(f, OutputSettings(), tmp_path / f"{i}.png")[0] for i, f in enumerate(frames))
     (result,) = compare(a, b)
-    rgb = [np.ascontiguousarray(files.read(path)["beauty"][..., :3]) for path in (b, a)]
+    rgb = [np.ascontiguousarray(reading.read(path)["beauty"][..., :3]) for path in (b, a)]
     assert result.flip == pytest.approx(evaluator.evaluate(*rgb, "LDR", applyMagma=False)[1])

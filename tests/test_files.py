@@ -16,21 +16,17 @@ import OpenImageIO as oiio
 import pytest
 
 from defshade_cli.errors import OutputError, UsageError
-from defshade_cli.image import files
-from defshade_cli.image.encoders import SUFFIXES
+from defshade_cli.image import files, reading
+from defshade_cli.image.encoders import SUFFIXES, check_format
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import LAYERS
 from defshade_cli.settings import COMPRESSIONS, OutputSettings
-from films import film
+from films import film, with_beauty
 
 COLOURS = [name for name, layer in LAYERS.items() if layer.is_color]
 DATA = [name for name in LAYERS if name not in COLOURS]
 PICTURES = [suffix for suffix in SUFFIXES if suffix != ".exr"]
 DEFAULT = OutputSettings()
-
-
-def with_beauty(values: np.ndarray) -> Film:
-    return replace(film("beauty"), layers={"beauty": np.asarray(values, np.float32)})
 
 
 @contextmanager
@@ -48,7 +44,7 @@ def largest_file(size: int) -> Iterator[None]:
 def test_exr_keeps_data_to_the_bit_and_colour_to_half(compression: str, tmp_path: Path) -> None:
     frame = film()
     assert files.write(frame, OutputSettings(compression=compression), tmp_path / "a.exr") == (tmp_path / "a.exr",)
-    layers = files.read(tmp_path / "a.exr")
+    layers = reading.read(tmp_path / "a.exr")
     assert set(layers) == set(LAYERS)
     for name in COLOURS:
         np.testing.assert_array_equal(layers[name], frame.layers[name].astype(np.float16).astype(np.float32))
@@ -60,7 +56,7 @@ def test_dwaa_loses_colour_only(tmp_path: Path) -> None:
     """At DWA's default level of 45 noise of 0..4 moves by less than 0.1; depth.Z is no channel that it blurs."""
     frame = film("beauty", "depth")
     files.write(frame, OutputSettings(compression="dwaa"), tmp_path / "a.exr")
-    layers = files.read(tmp_path / "a.exr")
+    layers = reading.read(tmp_path / "a.exr")
     np.testing.assert_array_equal(layers["depth"], frame.layers["depth"])
     assert 0 < np.abs(layers["beauty"] - frame.layers["beauty"]).max() < 0.1
 
@@ -69,14 +65,14 @@ def test_dwaa_loses_colour_only(tmp_path: Path) -> None:
 def test_dwaa_gives_way_to_data_that_it_would_blur(name: str, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     frame = film("beauty", name)
     files.write(frame, OutputSettings(compression="dwaa"), tmp_path / "a.exr")
-    np.testing.assert_array_equal(files.read(tmp_path / "a.exr")[name], frame.layers[name])
-    assert ("zip" in caplog.text) == (name not in ("depth", "distance"))
+    np.testing.assert_array_equal(reading.read(tmp_path / "a.exr")[name], frame.layers[name])
+    assert ("zip" in caplog.text) == bool({"R", "G", "B", "Y"} & set(LAYERS[name].channels))
 
 
 def test_full_float_keeps_everything_to_the_bit(tmp_path: Path) -> None:
     frame = film()
     files.write(frame, OutputSettings(full_float=True), tmp_path / "a.exr")
-    for name, values in files.read(tmp_path / "a.exr").items():
+    for name, values in reading.read(tmp_path / "a.exr").items():
         np.testing.assert_array_equal(values, frame.layers[name])
 
 
@@ -84,7 +80,7 @@ def test_full_float_keeps_everything_to_the_bit(tmp_path: Path) -> None:
 def test_every_row_is_written(height: int, tmp_path: Path) -> None:
     frame = film("beauty", "depth", size=(5, height))
     files.write(frame, OutputSettings(full_float=True), tmp_path / "a.exr")
-    for name, values in files.read(tmp_path / "a.exr").items():
+    for name, values in reading.read(tmp_path / "a.exr").items():
         np.testing.assert_array_equal(values, frame.layers[name])
 
 
@@ -124,8 +120,8 @@ def test_split_layers_read_back_under_their_names(tmp_path: Path) -> None:
     frame = film("beauty", "depth", "normal")
     paths = files.write(frame, OutputSettings(split_layers=True), tmp_path / "a.exr")
     assert [path.name for path in paths] == ["a.beauty.exr", "a.depth.exr", "a.normal.exr"]
-    assert [list(files.read(path)) for path in paths] == [["beauty"], ["depth"], ["normal"]]
-    np.testing.assert_array_equal(files.read(paths[1])["depth"], frame.layers["depth"])
+    assert [list(reading.read(path)) for path in paths] == [["beauty"], ["depth"], ["normal"]]
+    np.testing.assert_array_equal(reading.read(paths[1])["depth"], frame.layers["depth"])
 
 
 @pytest.mark.parametrize("suffix", PICTURES)
@@ -135,7 +131,7 @@ def test_every_picture_format_reads_back(suffix: str, tmp_path: Path) -> None:
     values[..., 0], values[..., 1] = np.linspace(0, 1, 24), np.linspace(0, 1, 16)[:, None]
     values[..., 3] = 1
     (path,) = files.write(with_beauty(values), OutputSettings(view="Raw"), tmp_path / f"a{suffix}")
-    beauty = files.read(path)["beauty"]
+    beauty = reading.read(path)["beauty"]
     tolerance = {".tif": 0.5 / 65535, ".tiff": 0.5 / 65535, ".jpg": 5 / 255, ".jpeg": 5 / 255}.get(suffix, 0.5 / 255)
     np.testing.assert_allclose(beauty[..., :3], values[..., :3], atol=tolerance + 1e-6)
 
@@ -144,19 +140,19 @@ def test_every_picture_format_reads_back(suffix: str, tmp_path: Path) -> None:
 def test_alpha_is_straight_in_pictures(suffix: str, tmp_path: Path) -> None:
     values = np.full((8, 8, 4), (0.2, 0.1, 0.05, 0.25), np.float32)
     (path,) = files.write(with_beauty(values), OutputSettings(view="Raw"), tmp_path / f"a{suffix}")
-    np.testing.assert_allclose(files.read(path)["beauty"][0, 0], [0.8, 0.4, 0.2, 0.25], atol=0.5 / 255 + 1e-6)
+    np.testing.assert_allclose(reading.read(path)["beauty"][0, 0], [0.8, 0.4, 0.2, 0.25], atol=0.5 / 255 + 1e-6)
 
 
 @pytest.mark.parametrize("suffix", [".jpg", ".bmp", ".ppm"])
 def test_formats_without_alpha_show_the_picture_on_black(suffix: str, tmp_path: Path) -> None:
     values = np.full((8, 8, 4), (0.2, 0.1, 0.05, 0.25), np.float32)
     (path,) = files.write(with_beauty(values), OutputSettings(view="Raw"), tmp_path / f"a{suffix}")
-    np.testing.assert_allclose(files.read(path)["beauty"][0, 0], [0.2, 0.1, 0.05], atol=2 / 255)
+    np.testing.assert_allclose(reading.read(path)["beauty"][0, 0], [0.2, 0.1, 0.05], atol=2 / 255)
 
 
 def test_pictures_of_data(tmp_path: Path) -> None:
     frame = film("beauty", "depth", "normal", "roughness")
-    _, depth, normal, roughness = (files.read(p) for p in files.write(frame, DEFAULT, tmp_path / "a.png"))
+    _, depth, normal, roughness = (reading.read(p) for p in files.write(frame, DEFAULT, tmp_path / "a.png"))
     np.testing.assert_allclose(normal["beauty"], 0.5 * frame.layers["normal"] + 0.5, atol=0.5 / 255 + 1e-6)
     np.testing.assert_allclose(roughness["beauty"], frame.layers["roughness"], atol=0.5 / 255 + 1e-6)
     nearest = np.argmin(frame.layers["depth"])
@@ -183,7 +179,7 @@ def test_read_back_views_are_written_as_they_look(name: str, suffix: str, tmp_pa
     paths = [tmp_path / f"{index}{suffix}" for index in range(3)]
     for path, frame in zip(paths, frames, strict=True):
         files.write(frame, DEFAULT, path)
-    plain, *others = (next(iter(files.read(path).values())) for path in paths)
+    plain, *others = (next(iter(reading.read(path).values())) for path in paths)
     for other in others:
         np.testing.assert_array_equal(other, plain)
 
@@ -194,12 +190,12 @@ def test_light_beyond_half_is_clamped_and_told(tmp_path: Path, caplog: pytest.Lo
     with caplog.at_level(logging.WARNING, "defshade"):
         files.write(with_beauty(values), DEFAULT, tmp_path / "a.exr")
     assert "beauty: 3 values beyond half's 65504 are clamped" in caplog.text
-    np.testing.assert_array_equal(files.read(tmp_path / "a.exr")["beauty"][0, 0], [65504, -65504, 65504, 1])
+    np.testing.assert_array_equal(reading.read(tmp_path / "a.exr")["beauty"][0, 0], [65504, -65504, 65504, 1])
 
 
 def test_full_float_clamps_nothing(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     files.write(with_beauty(np.full((4, 4, 4), 1e6)), OutputSettings(full_float=True), tmp_path / "a.exr")
-    assert files.read(tmp_path / "a.exr")["beauty"].max() == 1e6 and not caplog.text
+    assert reading.read(tmp_path / "a.exr")["beauty"].max() == 1e6 and not caplog.text
 
 
 @pytest.mark.parametrize("suffix", [".exr", ".png"])
@@ -209,7 +205,7 @@ def test_nan_is_told(suffix: str, tmp_path: Path, caplog: pytest.LogCaptureFixtu
     with caplog.at_level(logging.WARNING, "defshade"):
         files.write(with_beauty(values), OutputSettings(view="Raw"), tmp_path / f"a{suffix}")
     assert "beauty: 2 values are NaN" in caplog.text
-    beauty = files.read(tmp_path / f"a{suffix}")["beauty"]
+    beauty = reading.read(tmp_path / f"a{suffix}")["beauty"]
     assert np.isnan(beauty[1, 2:, 0]).all() if suffix == ".exr" else (beauty[1, 2:, 0] == 0).all()
     assert (beauty[..., 3] == 1).all()
 
@@ -250,7 +246,7 @@ def test_threads_write_beside_one_another(tmp_path: Path) -> None:
         thread.start()
     for thread in threads:
         thread.join()
-    assert [files.read(path)["beauty"].mean() for path in paths] == [0.25, 0.5, 0.75, 1.0]
+    assert [reading.read(path)["beauty"].mean() for path in paths] == [0.25, 0.5, 0.75, 1.0]
 
 
 def test_folders_are_made(tmp_path: Path) -> None:
@@ -289,80 +285,86 @@ def test_a_locked_folder_is_known_beforehand(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["a", "a.mov", "a.exr.bak"])
 def test_unknown_suffixes_name_the_known(name: str, tmp_path: Path) -> None:
-    for call in (files.check_writable, lambda path: files.write(film("beauty"), DEFAULT, path)):
+    for call in (lambda path: check_format(path, DEFAULT), lambda path: files.write(film("beauty"), DEFAULT, path)):
         with pytest.raises(UsageError, match=r"\.exr, \.png"):
             call(tmp_path / name)
 
 
-def test_unreadable_files(tmp_path: Path) -> None:
-    (tmp_path / "broken.exr").write_bytes(b"not an image")
-    for name in ("missing.exr", "broken.exr"):
-        with pytest.raises(OutputError, match=name):
-            files.read(tmp_path / name)
+ARRANGEMENTS = [{"multipart": True}, {"tiled": True}, {"mipmaps": True}, {"multipart": True, "tiled": True}]
 
 
-def test_a_truncated_exr_is_an_error(tmp_path: Path) -> None:
-    path = tmp_path / "a.exr"
-    files.write(film("beauty", size=(256, 256)), DEFAULT, path)
-    path.write_bytes(path.read_bytes()[:-4000])
-    with pytest.raises(OutputError, match="cannot be read"):
-        files.read(path)
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS, ids=str)
+def test_every_arrangement_of_an_exr_holds_the_same(arrangement: dict[str, bool], tmp_path: Path) -> None:
+    frame = film()
+    files.write(frame, DEFAULT, tmp_path / "plain.exr")
+    files.write(frame, OutputSettings(**arrangement, verify=True), tmp_path / "arranged.exr")
+    plain, arranged = reading.read(tmp_path / "plain.exr"), reading.read(tmp_path / "arranged.exr")
+    assert set(plain) == set(arranged)
+    for name, pixels in plain.items():
+        np.testing.assert_array_equal(arranged[name], pixels)
 
 
-def test_what_was_rewritten_is_read_anew(tmp_path: Path) -> None:
-    path = tmp_path / "a.exr"
-    for value in (0.25, 0.5):
-        files.write(with_beauty(np.full((4, 4, 4), value)), DEFAULT, path)
-        assert files.read(path)["beauty"].max() == value
+def test_parts_are_named_after_their_layers(tmp_path: Path) -> None:
+    files.write(film("beauty", "depth", "normal"), OutputSettings(multipart=True), tmp_path / "a.exr")
+    source = oiio.ImageInput.open(str(tmp_path / "a.exr"))
+    names = []
+    while source.seek_subimage(len(names), 0):
+        names.append(source.spec().get_string_attribute("oiio:subimagename"))
+    assert names == ["rgba", "depth", "normal"]
 
 
-def write_foreign(path: Path, *parts: tuple[str, tuple[str, ...]], window: tuple[int, int] = (0, 0)) -> None:
-    """An EXR as others write it: parts of (name, channels), channel c holding c + 1, on a 6x4 canvas."""
-    specs = []
-    for name, channels in parts:
-        spec = oiio.ImageSpec(3, 2, len(channels), "float")
-        spec.channelnames = channels
-        spec.x, spec.y = window
-        spec.full_width, spec.full_height = 6, 4
-        spec.attribute("oiio:subimagename", name)
-        specs.append(spec)
-    output = oiio.ImageOutput.create(str(path))
-    assert output.open(str(path), tuple(specs)), output.geterror()
-    for index, spec in enumerate(specs):
-        if index:
-            assert output.open(str(path), spec, "AppendSubimage")
-        pixels = np.ones((2, 3, spec.nchannels), np.float32) * np.arange(1, spec.nchannels + 1, dtype=np.float32)
-        assert output.write_image(pixels), output.geterror()
-    output.close()
+def test_mip_levels_are_means_down_to_one_pixel(tmp_path: Path) -> None:
+    frame = film("position", size=(8, 4))
+    files.write(frame, OutputSettings(mipmaps=True), tmp_path / "a.exr")
+    source = oiio.ImageInput.open(str(tmp_path / "a.exr"))
+    levels = [source.read_image(0, level, 0, 3, oiio.FLOAT) for level in range(4)]
+    assert [level.shape[:2] for level in levels] == [(4, 8), (2, 4), (1, 2), (1, 1)]
+    pixels = frame.layers["position"]
+    np.testing.assert_allclose(levels[3][0, 0], pixels.mean(axis=(0, 1)), rtol=1e-6)
+    np.testing.assert_allclose(levels[1][1, 0], pixels[2:, :2].mean(axis=(0, 1)), rtol=1e-6)
 
 
-def test_parts_of_other_renderers_become_layers(tmp_path: Path) -> None:
-    path = tmp_path / "parts.exr"
-    write_foreign(path, ("beauty", ("R", "G", "B", "A")), ("depth", ("Z",)), ("N", ("N.X", "N.Y", "N.Z")))
-    layers = files.read(path)
-    assert {name: values.shape[2] for name, values in layers.items()} == {"beauty": 4, "depth": 1, "N": 3}
+@pytest.mark.parametrize("suffix", [".png", ".tif", ".jxl"])
+@pytest.mark.parametrize("bits", [8, 16])
+def test_bits_of_a_channel(suffix: str, bits: int, tmp_path: Path) -> None:
+    path = tmp_path / f"a{suffix}"
+    files.write(film("beauty"), OutputSettings(bits=bits), path)
+    assert str(oiio.ImageInput.open(str(path)).spec().format) == f"uint{bits}"
 
 
-def test_nested_and_bare_channels_of_other_renderers(tmp_path: Path) -> None:
-    path = tmp_path / "bare.exr"
-    write_foreign(path, ("", ("R", "G", "B", "Z", "ViewLayer.Combined.R")))
-    layers = files.read(path)
-    assert {name: values.shape[2] for name, values in layers.items()} == {
-        "beauty": 3,
-        "depth": 1,
-        "ViewLayer.Combined": 1,
-    }
+def test_dither_keeps_the_mean_of_a_gradient_that_8_bits_would_round(tmp_path: Path) -> None:
+    """A step of 0.25/255 below a rounding edge: without dither every pixel falls on the same side."""
+    flat = np.full((256, 256, 3), 0.2 + 0.25 / 255, np.float32)
+    output = OutputSettings(display="sRGB - Display", view="Raw")
+    values = {}
+    for dither in (False, True):
+        files.write(
+            with_beauty(np.dstack([flat, np.ones((256, 256))])), replace(output, dither=dither), tmp_path / "a.png"
+        )
+        values[dither] = reading.read(tmp_path / "a.png")["beauty"][..., 0] * 255
+    assert np.ptp(values[False]) == 0
+    assert values[True].mean() == pytest.approx(51.25, abs=0.05)
 
 
-@pytest.mark.parametrize("window", [(2, 1), (-1, -1), (4, 3)])
-def test_cropped_images_are_filled_up(window: tuple[int, int], tmp_path: Path) -> None:
-    path = tmp_path / "crop.exr"
-    write_foreign(path, ("", ("R", "G", "B")), window=window)
-    beauty = files.read(path)["beauty"]
-    expected = np.zeros((4, 6, 3))
-    for y in range(2):
-        for x in range(3):
-            row, column = window[1] + y, window[0] + x
-            if 0 <= row < 4 and 0 <= column < 6:
-                expected[row, column] = 1, 2, 3
-    np.testing.assert_array_equal(beauty, expected)
+def test_the_data_window_stands_in_the_display_window(tmp_path: Path) -> None:
+    frame = film("beauty", "depth", origin=(5, 3), display=(64, 48))
+    files.write(frame, OutputSettings(verify=True), tmp_path / "a.exr")
+    spec = oiio.ImageInput.open(str(tmp_path / "a.exr")).spec()
+    assert (spec.x, spec.y, spec.width, spec.height) == (5, 3, *frame.size)
+    assert (spec.full_width, spec.full_height) == (64, 48)
+    np.testing.assert_array_equal(
+        reading.read(tmp_path / "a.exr")["depth"][3 : 3 + frame.size[1], 5 : 5 + frame.size[0]], frame.layers["depth"]
+    )
+
+
+@pytest.mark.parametrize("output", [DEFAULT, OutputSettings(full_float=True), OutputSettings(compression="dwaa")])
+def test_what_reads_back_otherwise_is_refused(
+    output: OutputSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frame = film("beauty", "depth")
+    other = replace(frame, layers=frame.layers | {"depth": frame.layers["depth"] + 1})
+    real = files.encode
+    monkeypatch.setattr(files, "encode", lambda film, *rest: real(other, *rest))
+    with pytest.raises(OutputError, match="layer depth read back otherwise"):
+        files.write(frame, replace(output, verify=True), tmp_path / "a.exr")
+    assert not any(tmp_path.iterdir())

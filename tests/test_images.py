@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from defshade_cli import resources
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.compare import difference
-from defshade_cli.image.files import read, write
+from defshade_cli.image.files import write
 from defshade_cli.image.film import Film
+from defshade_cli.image.reading import read
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.settings import OutputSettings, RenderSettings

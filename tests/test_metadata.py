@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -11,7 +12,7 @@ import OpenImageIO as oiio
 import pytest
 
 from defshade_cli import __version__
-from defshade_cli.image import files
+from defshade_cli.image import files, reading
 from defshade_cli.image.metadata import frame_rate, provenance, world_to_camera, world_to_ndc
 from defshade_cli.scene.camera import Camera
 from defshade_cli.settings import OutputSettings
@@ -85,8 +86,8 @@ def test_header_as_openexr_reads_it(exr: Path) -> None:
     assert header["screenWindowCenter"] == pytest.approx([-0.1, 0.025])
     np.testing.assert_allclose(header["worldToCamera"], world_to_camera(camera), rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(header["worldToNDC"], world_to_ndc(camera), rtol=1e-6, atol=1e-6)
-    assert (header["defshade/depth/unit"], header["defshade/depth/space"]) == ("scene units", "camera")
-    assert header["defshade/depth/background"] == float("inf")
+    depth = {"unit": "scene units", "space": "camera", "background": "inf", "antialiased": False}
+    assert json.loads(header["defshade/layers"])["depth"] == depth
     assert header["defshade/samples"] == 16
     assert all(len(name) <= 31 for name in header), "longer names close the file to readers before OpenEXR 2"
 
@@ -99,7 +100,7 @@ def test_dates_are_local_time_with_its_offset(exr: Path) -> None:
 
 
 def test_provenance_comes_back_from_exr_with_its_types(exr: Path) -> None:
-    header = files.read_header(exr)
+    header = reading.read_header(exr)
     assert (header["scene"], header["camera"], header["samples"]) == ("kitchen", "/World/Cam", 16)
     assert (header["frame"], header["seconds"], header["sizes"]) == (12.0, 1.5, "[1, 2]")
 
@@ -108,7 +109,7 @@ def test_provenance_comes_back_from_exr_with_its_types(exr: Path) -> None:
 def test_provenance_comes_back_from_pictures_as_text(suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"a{suffix}"
     files.write(film("beauty"), OutputSettings(), path)
-    header = files.read_header(path)
+    header = reading.read_header(path)
     assert (header["scene"], header["stage hash"], header["samples"]) == ("kitchen", "0123abcd", "16")
 
 

@@ -19,7 +19,7 @@ from defshade_cli.cli.batch import batch
 from defshade_cli.errors import UsageError
 from defshade_cli.farm.frames import parse_frames
 from defshade_cli.farm.openjd import range_expression
-from defshade_cli.image.files import read
+from defshade_cli.image.reading import read
 from defshade_cli.resources import SCENES
 
 ROOT = Path(__file__).resolve().parent.parent

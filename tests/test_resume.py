@@ -16,7 +16,8 @@ import pytest
 
 from defshade_cli.farm.fingerprint import Fingerprint
 from defshade_cli.farm.targets import FINGERPRINT
-from defshade_cli.image.files import read_header, remove_abandoned, write
+from defshade_cli.image.files import remove_abandoned, write
+from defshade_cli.image.reading import read_header
 from defshade_cli.render import Renderer, run
 from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
 from films import film

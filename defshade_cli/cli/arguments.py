@@ -8,14 +8,14 @@ from typing import Any
 
 import click
 
-from defshade_cli.cli.types import Size
-from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
+from defshade_cli.cli.types import Crop, Size
+from defshade_cli.settings import Composition, OutputSettings, RenderJob, RenderSettings
 
-_NOT_OPTIONS = {"stage", "frames", "settings", "output", "patterns"}
+_NOT_OPTIONS = {"stage", "frames", "composition", "session_layers", "settings", "output", "patterns"}
 
 
 def option_arguments(job: RenderJob, params: Iterable[click.Parameter]) -> list[str]:
-    """What to type for all of the job that is not the default: stage, frames and output files apart.
+    """What to type for all of the job that is not the default: stage, session layers, frames and output files apart.
 
     params: of the command, the options among them.
     """
@@ -26,7 +26,12 @@ def option_arguments(job: RenderJob, params: Iterable[click.Parameter]) -> list[
 
 def _chosen(job: RenderJob) -> Iterator[tuple[str, Any]]:
     """Names and values of the fields that differ from their defaults."""
-    defaults = ((job, RenderJob(job.stage)), (job.settings, RenderSettings()), (job.output, OutputSettings()))
+    defaults = (
+        (job, RenderJob(job.stage)),
+        (job.composition, Composition()),
+        (job.settings, RenderSettings()),
+        (job.output, OutputSettings()),
+    )
     for owner, default in defaults:
         for field in fields(owner):
             value = getattr(owner, field.name)
@@ -39,5 +44,6 @@ def _typed(option: click.Option, value: Any) -> list[str]:
         return [option.opts[-1] if value else option.secondary_opts[-1]]
     if option.multiple:
         return [part for item in value for part in (option.opts[-1], str(item))]
-    separator = "x" if isinstance(option.type, Size) else ","
-    return [option.opts[-1], separator.join(map(str, value)) if isinstance(value, tuple) else str(value)]
+    if isinstance(option.type, Size | Crop):
+        return [option.opts[-1], option.type.text(value)]
+    return [option.opts[-1], ",".join(map(str, value)) if isinstance(value, tuple) else str(value)]

@@ -100,9 +100,10 @@ def _write_difference(image: Path, reference: Path, path: Path) -> None:
     import numpy as np
 
     from defshade_cli.image.compare import difference
-    from defshade_cli.image.files import read, write
+    from defshade_cli.image.files import write
     from defshade_cli.image.film import Film
     from defshade_cli.image.layers import BEAUTY, LAYERS
+    from defshade_cli.image.reading import read
     from defshade_cli.scene.camera import Camera
 
     first, second = read(image), read(reference)

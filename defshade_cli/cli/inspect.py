@@ -43,14 +43,15 @@ def inspect(job: RenderJob, as_json: bool, with_plan: bool) -> None:
 
     scene, plan = examine(job)
     if as_json:
-        click.echo(json.dumps(plain(_record(scene, plan)), indent=2, allow_nan=False))
+        click.echo(json.dumps(plain(_record(job, scene, plan)), indent=2, allow_nan=False))
     else:
-        _show(_tree(scene, plan, with_plan))
+        _show(_tree(job, scene, plan, with_plan))
 
 
-def _record(scene: Scene, plan: Plan) -> dict[str, Any]:
+def _record(job: RenderJob, scene: Scene, plan: Plan) -> dict[str, Any]:
     return {
         "stage": scene.name,
+        "composition": job.composition.choices,
         "frame": scene.frame,
         "frames_per_second": scene.frames_per_second,
         "up_axis": scene.up_axis,
@@ -74,7 +75,7 @@ def _geometry(scene: Scene) -> dict[str, int]:
     return {"meshes": len(scene.meshes), "instances": instances, "triangles": scene.triangle_count}
 
 
-def _tree(scene: Scene, plan: Plan, with_plan: bool) -> Tree:
+def _tree(job: RenderJob, scene: Scene, plan: Plan, with_plan: bool) -> Tree:
     from rich.tree import Tree
 
     width, height = plan.size
@@ -82,6 +83,9 @@ def _tree(scene: Scene, plan: Plan, with_plan: bool) -> Tree:
         f"{scene.name}  frame {frame_name(scene.frame)}, {width}x{height}, {scene.up_axis} up, "
         f"{scene.meters_per_unit:g} m a unit, {scene.frames_per_second:g} frames a second"
     )
+    if choices := job.composition.choices:
+        lines = [f"{name.replace('_', ' ')}: {choice}" for name, choice in choices.items()]
+        _branch(tree, "composition", lines, counted=False)
     _branch(tree, "cameras", _camera_lines(scene))
     _branch(tree, "lights", [_light_line(*light) for light in _lights(scene, plan)])
     _branch(tree, "materials", [material.path for material in scene.materials])

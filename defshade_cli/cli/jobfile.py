@@ -110,7 +110,16 @@ class _JobFile:
     def settings(self, node: Node) -> dict[str, Any]:
         names = dict(self._setting_names())
         nodes = self.mapping(node, names)
-        return {names[key]: self.value(names[key], ",".join(self.texts(value)), value) for key, value in nodes.items()}
+        return {names[key]: self.setting(names[key], value) for key, value in nodes.items()}
+
+    def setting(self, name: str, node: Node) -> Any:
+        """A list is several values for an option that is repeatable, else one with commas. Files lie beside ours."""
+        texts, option = self.texts(node), self._options[name]
+        if isinstance(option.type, click.Path):
+            texts = [str(self._path.parent / text) for text in texts]
+        if option.multiple:
+            return tuple(self.value(name, text, node) for text in texts)
+        return self.value(name, ",".join(texts), node)
 
     def value(self, name: str, text: str, node: Node) -> Any:
         """`text` as the option reads it."""

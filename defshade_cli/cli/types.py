@@ -11,6 +11,10 @@ from typing import Any
 import click
 
 from defshade_cli.errors import UsageError
+from defshade_cli.settings import VariantChoice
+
+Region = tuple[int, int, int, int]
+"""(x, y, width, height) in pixels."""
 
 
 class Size(click.ParamType):
@@ -23,6 +27,26 @@ class Size(click.ParamType):
         if not match:
             self.fail(f"{value!r} is not a size in pixels such as 1920x1080", param, ctx)
         return int(match[1]), int(match[2])
+
+    def text(self, value: tuple[int, int]) -> str:
+        return f"{value[0]}x{value[1]}"
+
+
+class Crop(click.ParamType):
+    """`640x360+100-20` → (100, -20, 640, 360), as oiiotool writes regions."""
+
+    name = "WxH+X+Y"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Region:
+        match = re.fullmatch(r"([1-9]\d*)x([1-9]\d*)([+-]\d+)([+-]\d+)", value)
+        if not match:
+            self.fail(f"{value!r} is not a part of the image such as 640x360+100+50", param, ctx)
+        width, height, x, y = map(int, match.groups())
+        return x, y, width, height
+
+    def text(self, value: Region) -> str:
+        x, y, width, height = value
+        return f"{width}x{height}{x:+d}{y:+d}"
 
 
 class Finite(click.ParamType):
@@ -40,6 +64,16 @@ class Finite(click.ParamType):
         return number
 
 
+class Positive(Finite):
+    """A finite float above 0."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        number = super().convert(value, param, ctx)
+        if number <= 0.0:
+            self.fail(f"{value!r} is not above 0", param, ctx)
+        return number
+
+
 class Frames(click.ParamType):
     """`1:10x2,15` → time codes; the syntax is farm.frames'."""
 
@@ -52,6 +86,20 @@ class Frames(click.ParamType):
             return tuple(parse_frames(value))
         except UsageError as error:
             self.fail(str(error), param, ctx)
+
+
+class OneOf(click.ParamType):
+    """One of some whole numbers."""
+
+    name = "number"
+
+    def __init__(self, choices: Sequence[int]) -> None:
+        self.choices = tuple(choices)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        if str(value) not in map(str, self.choices):
+            self.fail(f"{value!r} is not {' or '.join(map(str, self.choices))}", param, ctx)
+        return int(value)
 
 
 class Names(click.ParamType):
@@ -72,6 +120,46 @@ class Names(click.ParamType):
             if name not in self.choices:
                 self.fail(f"unknown {self.noun} {name!r}; {_suggestion(name, self.choices)}", param, ctx)
         return tuple(dict.fromkeys(names))
+
+
+class Layers(click.ParamType):
+    """Names of layers, ours or another renderer's, separated by commas → ours; `all` for every one of the table."""
+
+    name = "a,b,c"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
+        from defshade_cli.image.layers import resolve
+
+        names = [name.strip() for name in value.split(",")] if isinstance(value, str) else value
+        try:
+            return resolve(names)
+        except UsageError as error:
+            self.fail(str(error), param, ctx)
+
+
+class Variant(click.ParamType):
+    """`/Car{color=red}` → VariantChoice."""
+
+    name = "variant"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> VariantChoice:
+        try:
+            return VariantChoice.parse(value)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+class PrimPaths(click.ParamType):
+    """`/World/A,/World/B` → the paths, each once."""
+
+    name = "paths"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
+        paths = value.replace(",", " ").split()
+        for path in paths:
+            if not path.startswith("/"):
+                self.fail(f"{path!r} is no path of a prim, such as /World/Chair", param, ctx)
+        return tuple(dict.fromkeys(paths))
 
 
 class Threshold(click.ParamType):

@@ -40,15 +40,23 @@ class Fingerprint:
     @cached_property
     def _base(self) -> str | None:
         """What all frames have in common."""
+        layers = self._job.composition.session_layers
         try:
-            needed = read_dependencies(self._job.stage)
-            contents = sorted((name, _contents(path)) for name, path in needed.files.items())
+            contents = [_made_of(file) for file in (self._job.stage, *layers)]
         except (StageError, OSError) as error:
             log.info("its frames will never count as finished: %s", error)
             return None
         output = replace(self._job.output, patterns=(), existing="overwrite")
-        job = replace(self._job, stage=Path(self._job.stage.name), frames=(), device=None, output=output)
-        return repr((__version__, contents, needed.missing, job))
+        composition = replace(self._job.composition, session_layers=tuple(Path(layer.name) for layer in layers))
+        stage = Path(self._job.stage.name)
+        job = replace(self._job, stage=stage, composition=composition, frames=(), device=None, output=output)
+        return repr((__version__, contents, job))
+
+
+def _made_of(file: Path) -> tuple[list[tuple[str, str]], tuple[str, ...]]:
+    """Names and contents of all that a stage or layer depends on, and what of it is missing."""
+    needed = read_dependencies(file)
+    return sorted((name, _contents(path)) for name, path in needed.files.items()), needed.missing
 
 
 def _contents(path: Path) -> str:

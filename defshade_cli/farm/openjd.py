@@ -52,6 +52,7 @@ class _Group:
     """What the stages of one step have in common."""
 
     frames: tuple[float | None, ...]
+    session_layers: tuple[Path, ...]
     options: tuple[str, ...]
     patterns: tuple[str, ...]
     absolute: bool
@@ -63,13 +64,14 @@ class _Group:
 
 
 def make_template(jobs: Iterable[tuple[RenderJob, Sequence[str]]]) -> dict[str, Any]:
-    """The template of jobs, each with its options on the command line: those for stage, frames and output apart.
+    """The template of jobs, each with its options on the command line, those for files and frames apart.
 
     Raises UsageError for frames that are not whole numbers.
     """
     groups: dict[_Group, list[Path]] = {}
     for job, options in jobs:
-        group = _Group(job.frames, tuple(options), job.output.patterns, job.stage.is_absolute())
+        layers, patterns = job.composition.session_layers, job.output.patterns
+        group = _Group(job.frames, layers, tuple(options), patterns, job.stage.is_absolute())
         groups.setdefault(group, []).append(job.stage)
     parts = [
         (group, stages[start : start + _MOST_STAGES])
@@ -138,12 +140,13 @@ def _arguments(group: _Group) -> list[str]:
     frames = (
         ["--frames", OPENJD + "{{Task.Param.Frame}}"] if group.has_frames else ["--default-time"] * len(group.frames)
     )
+    layers = [part for path in group.session_layers for part in ("--session-layer", _placed(str(path)))]
     outputs = [part for pattern in group.patterns for part in ("-o", _placed(pattern))]
-    return ["render", stage, *frames, *group.options, *outputs, "--progress", "openjd"]
+    return ["render", stage, *frames, *layers, *group.options, *outputs, "--progress", "openjd"]
 
 
-def _placed(pattern: str) -> str:
-    return pattern if Path(pattern).is_absolute() else f"{{{{Param.Folder}}}}/{pattern}"
+def _placed(file: str) -> str:
+    return file if Path(file).is_absolute() else f"{{{{Param.Folder}}}}/{file}"
 
 
 def _whole(frame: float | None) -> int:

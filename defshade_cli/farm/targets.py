@@ -8,8 +8,9 @@ from pathlib import Path
 from defshade_cli.errors import OutputError, UsageError
 from defshade_cli.farm.names import expand, has_frame_token
 from defshade_cli.image.colour import resolve_view
-from defshade_cli.image.encoders import EXR, suffix_of
-from defshade_cli.image.files import check_writable, read_header, remove_abandoned, targets
+from defshade_cli.image.encoders import EXR, check_format, suffix_of
+from defshade_cli.image.files import check_writable, remove_abandoned, targets
+from defshade_cli.image.reading import read_header
 from defshade_cli.settings import RenderJob
 
 Frames = Sequence[float | None]
@@ -42,6 +43,8 @@ def check_outputs(job: RenderJob, frames: Frames, camera: str) -> None:
     if len(set(files)) < len(files):
         twice = next(file for file in files if files.count(file) > 1)
         raise UsageError(f"two outputs would be written to {twice}")
+    for file in files:
+        check_format(file, job.output)
     if any(suffix_of(file) != EXR for file in files):
         resolve_view(job.output.display, job.output.view)
     for folder_file in {file.parent: file for file in files}.values():

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from defshade_cli.errors import UsageError
 from defshade_cli.image.colour import BRIGHTEST, Pixels
-from defshade_cli.image.files import read
 from defshade_cli.image.layers import BEAUTY, LAYERS
+from defshade_cli.image.reading import read
 
 Image = Path | NDArray | Mapping[str, NDArray]
 """A file, the pixels (H, W, C) of a beauty, or layers by name."""

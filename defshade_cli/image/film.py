@@ -19,6 +19,8 @@ class Film:
     camera: conformed to the image's aspect.
     scene_name: the stage's file name without suffix; frame: time code, None for the default time.
     samples: a pixel.
+    origin: (x, y) of the first pixel in the display window, from its top left corner, y down.
+    display: (width, height) of the display window that the camera fills; None where that is the layers' own size.
     metadata: further facts for the file's header and `--stats`, JSON-like values.
     """
 
@@ -28,10 +30,17 @@ class Film:
     frame: float | None = None
     frames_per_second: float = 24.0
     samples: int = 1
+    origin: tuple[int, int] = (0, 0)
+    display: tuple[int, int] | None = None
     metadata: dict[str, Any] = field(default_factory=dict)
 
     @property
     def size(self) -> tuple[int, int]:
-        """(width, height) in pixels."""
+        """(width, height) of the layers in pixels: of the data window."""
         height, width = next(iter(self.layers.values())).shape[:2]
         return width, height
+
+    @property
+    def display_size(self) -> tuple[int, int]:
+        """(width, height) of the display window in pixels."""
+        return self.display or self.size

@@ -4,7 +4,7 @@
     camera     worldToCamera, worldToNDC, screenWindowCenter, screenWindowWidth, pixelAspectRatio
     time       framesPerSecond, capDate, utcOffset
     people     owner (Film.metadata's), comments, Software
-    defshade/  scene, camera, frame, samples and all of Film.metadata; LAYER/unit, LAYER/space, LAYER/background
+    defshade/  scene, camera, frame, samples and all of Film.metadata; layers: what each one's numbers mean, as JSON
 
 Definitions: OpenEXR, "Standard Attributes". Matrices there act on row vectors, and its camera space is left-handed with
 +z into the picture: USD's with z mirrored.
@@ -22,7 +22,7 @@ import numpy as np
 
 from defshade_cli import __version__
 from defshade_cli.image.film import Film
-from defshade_cli.image.layers import LAYERS
+from defshade_cli.image.layers import LAYERS, Layer
 from defshade_cli.scene.camera import Camera
 from defshade_cli.spaces import Matrix
 
@@ -49,11 +49,17 @@ def exr_attributes(film: Film, layers: tuple[str, ...]) -> Iterator[Attribute]:
     yield from text_attributes(film)
     for name, value in provenance(film).items():
         yield _attribute(PREFIX + name, value)
-    for name in layers:
-        layer = LAYERS[name]
-        yield Attribute(f"{PREFIX}{name}/unit", "string", layer.unit)
-        yield Attribute(f"{PREFIX}{name}/space", "string", layer.space)
-        yield Attribute(f"{PREFIX}{name}/background", "float", layer.background)
+    yield Attribute(f"{PREFIX}layers", "string", json.dumps({name: _meaning(LAYERS[name]) for name in layers}))
+
+
+def _meaning(layer: Layer) -> dict[str, str | bool]:
+    """For people and JSON parsers alike: an infinite background is the word inf."""
+    return {
+        "unit": layer.unit,
+        "space": layer.space,
+        "background": f"{layer.background:g}",
+        "antialiased": layer.filtered,
+    }
 
 
 def text_attributes(film: Film) -> Iterator[Attribute]:
@@ -123,7 +129,7 @@ def world_to_ndc(camera: Camera) -> Matrix:
 def _camera(film: Film) -> Iterator[Attribute]:
     camera = film.camera
     left, right, bottom, top = camera.window
-    width, height = film.size
+    width, height = film.display_size
     yield Attribute("worldToCamera", "matrix", _floats(world_to_camera(camera)))
     yield Attribute("worldToNDC", "matrix", _floats(world_to_ndc(camera)))
     yield Attribute("screenWindowCenter", "float2", (0.5 * (left + right), 0.5 * (bottom + top)))

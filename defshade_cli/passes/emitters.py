@@ -17,6 +17,7 @@ from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.emission import Emitter, emitter_at, far_field, sky_emitter
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
+from defshade_cli.spaces import Window
 
 DOME_DIRECTIONS = 4
 """Directions of a dome in one sample, each with a shadow map of its own."""
@@ -65,7 +66,7 @@ def _emitters(number: int, planned: PlannedLight, plan: Plan, sample: Sample, ex
 
 def shadow_extent(bounds: NDArray[np.float64], plan: Plan) -> ShadowExtent:
     """Casters: the (2, 3) bounds, relative to the eye. Receivers: their part of the box around the view's frustum."""
-    rotation, (left, right, bottom, top) = plan.camera.world_from_camera[:3, :3], plan.camera.window
+    rotation, (left, right, bottom, top) = plan.camera.world_from_camera[:3, :3], _filtered_window(plan)
     scales = plan.clip if plan.camera.projection == "perspective" else (1.0, 1.0)
     rays = np.array(list(product((left, right), (bottom, top))))
     frustum = [np.column_stack([rays * s, np.full(4, -z)]) for s, z in zip(scales, plan.clip, strict=True)]
@@ -73,6 +74,14 @@ def shadow_extent(bounds: NDArray[np.float64], plan: Plan) -> ShadowExtent:
     low, high = np.maximum(bounds[0], corners.min(axis=0)), np.minimum(bounds[1], corners.max(axis=0))
     seen = np.stack([low, high]) if (low <= high).all() else bounds
     return ShadowExtent(_corners(seen), _corners(bounds))
+
+
+def _filtered_window(plan: Plan) -> Window:
+    """The window and what filters of the outermost pixels see around it."""
+    left, right, bottom, top = plan.camera.window
+    reach = 0.5 * max(plan.filter_width - 1.0, 0.0)
+    x, y = reach * (right - left) / plan.size[0], reach * (top - bottom) / plan.size[1]
+    return left - x, right + x, bottom - y, top + y
 
 
 def _corners(box: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -54,8 +54,9 @@ class GBufferVariant:
     @property
     def defines(self) -> list[str]:
         flags = ["CUTOUT"] * self.cutout + ["DISPLAY_COLOR_VARIES"] * self.color_varies
-        flags += ["TEXTURES"] * bool(self.texture_groups)
-        return [plane.define for plane in self.planes] + flags
+        flags += ["TEXTURES", "POSITION"] * bool(self.texture_groups)
+        inputs = [name for plane in self.planes for name in plane.inputs]
+        return list(dict.fromkeys([plane.define for plane in self.planes] + flags + inputs))
 
 
 class GBufferPass:
@@ -80,6 +81,6 @@ class GBufferPass:
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = "<" if standard else ">"
         draws.textures.bind(self._program)
-        vertex_array = self._context.vertex_array(self._program, list(draws.vertices), draws.indices)
+        vertex_array = self._context.vertex_array(self._program, draws.vertices_of(self._program), draws.indices)
         vertex_array.render_indirect(draws.commands)
         vertex_array.release()

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.planes import MOST_TARGETS, Plane
 from defshade_cli.gpu.residence import LIGHTS, VIEW, DrawList, GpuScene, RecordBuffer
 from defshade_cli.gpu.targets import Target
 from defshade_cli.image.film import Film
@@ -48,15 +49,17 @@ class Pipeline:
     def render(self, scene: Scene, plan: Plan) -> Film:
         """The plan's layers. Raises GpuError."""
         self._gpu.make_current()
-        draws = self._scene.update(scene)
+        draws = self._scene.update(scene, layer_uv=plan.reads("LAYER_UV"))
         layers: dict[str, NDArray[np.float32]] = {}
-        if plan.lit:
-            layers["beauty"] = self._beauty(draws, scene, plan)
-        if len(layers) < len(plan.layers):
+        if plan.sampled:
+            layers |= self._sampled_layers(draws, scene, plan)
+        if plan.data_layers:
             layers |= data_layers(self._data_planes(draws, plan), plan)
         return Film(
             layers={name: layers[name] for name in plan.layers},
-            camera=plan.camera,
+            camera=plan.display_camera,
+            origin=plan.window.origin,
+            display=plan.display,
             scene_name=scene.name,
             frame=scene.frame,
             frames_per_second=scene.frames_per_second,
@@ -66,19 +69,21 @@ class Pipeline:
     def planes(self, scene: Scene, plan: Plan) -> Planes:
         """The float GBuffer at the pixels' centres: what the float64 reference is evaluated on."""
         self._gpu.make_current()
-        return self._drawn_planes(self._scene.update(scene), plan)
+        return self._drawn_planes(self._scene.update(scene), plan.planes, plan)
 
-    def _beauty(self, draws: DrawList, scene: Scene, plan: Plan) -> NDArray[np.float32]:
+    def _sampled_layers(self, draws: DrawList, scene: Scene, plan: Plan) -> dict[str, NDArray[np.float32]]:
+        """What is a mean of samples."""
         gbuffer = self._frame.gbuffer(plan.size, plan.planes, plan.layout)
         radiance = self._frame.radiance("sample", plan.size, gbuffer)
         total = self._frame.radiance("total", plan.size) if plan.samples > 1 else radiance
         total.framebuffer.clear()
-        for sample in samples(plan.samples):
+        for sample in samples(plan.samples, plan.filter, plan.filter_width):
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             self._light(draws, scene, plan, sample, gbuffer, radiance)
             if plan.samples > 1:
                 self._accumulation.add(radiance, total)
-        return np.divide(total.read("radiance"), plan.samples, dtype=np.float32)
+        beauty = np.divide(total.read("radiance"), plan.samples, dtype=np.float32)
+        return {"beauty": beauty, "alpha": beauty[..., 3:]}
 
     def _light(
         self, draws: DrawList, scene: Scene, plan: Plan, sample: Sample, gbuffer: GBuffer, radiance: Target
@@ -88,7 +93,7 @@ class Pipeline:
         lighting.begin(gbuffer, radiance)
         for dome in plan.domes:
             self._environment_pass(EnvironmentVariant.of(plan)).draw(dome, gbuffer, radiance)
-        for batch in light_batches(scene, plan, sample):
+        for batch in light_batches(scene, plan, sample) if plan.lit else ():
             shadows = None
             if plan.shadows:
                 shadow_pass = self._shadow_pass(plan.cutout, draws.color_varies, draws.texture_groups)
@@ -98,15 +103,21 @@ class Pipeline:
             lighting.add(lights, gbuffer, radiance, shadows)
 
     def _data_planes(self, draws: DrawList, plan: Plan) -> Planes:
-        """Planes for the data layers: the beauty's own where it drew them in float at the pixels' centres."""
-        if plan.lit and not plan.data_pass:
-            return read_planes(self._frame.gbuffer(plan.size, plan.planes, plan.layout), plan)
-        return self._drawn_planes(draws, plan)
+        """Planes for the data layers: the beauty's own where it drew them in float at the pixels' centres.
 
-    def _drawn_planes(self, draws: DrawList, plan: Plan) -> Planes:
-        gbuffer = self._frame.gbuffer(plan.size, plan.planes, "float")
+        Else as many at a time as a framebuffer takes.
+        """
+        if not plan.data_pass:
+            return read_planes(self._frame.gbuffer(plan.size, plan.planes, plan.layout), plan.data_planes, plan)
+        planes: Planes = {}
+        for first in range(0, max(len(plan.data_planes), 1), MOST_TARGETS):
+            planes |= self._drawn_planes(draws, plan.data_planes[first : first + MOST_TARGETS], plan)
+        return planes
+
+    def _drawn_planes(self, draws: DrawList, planes: tuple[Plane, ...], plan: Plan) -> Planes:
+        gbuffer = self._frame.gbuffer(plan.size, planes, "float")
         self._draw_gbuffer(draws, plan, gbuffer, CENTRE)
-        return read_planes(gbuffer, plan)
+        return read_planes(gbuffer, planes, plan)
 
     def _draw_gbuffer(self, draws: DrawList, plan: Plan, gbuffer: GBuffer, sample: Sample) -> None:
         self._view.write(view_record(plan, gbuffer.layout, sample))

@@ -9,6 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from defshade_cli.passes.filters import filter_offset
+from defshade_cli.settings import Filter
+
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 
@@ -18,7 +21,10 @@ _PIXEL, _TEXEL, _LENS, _LIGHTS = range(4)
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One sample: its index, and places in the unit square: in its pixel, in a shadow map's texel, on the lens."""
+    """One sample: its index, and places in unit squares: its pixel, a shadow map's texel, the lens.
+
+    pixel: (0.5, 0.5) is the centre; a wide filter passes the pixel's edges.
+    """
 
     index: int
     pixel: Pair
@@ -39,13 +45,14 @@ CENTRE = Sample(0, (0.5, 0.5), (0.5, 0.5), (0.5, 0.5))
 """The middle of everything: the only sample of a frame that has one, and the sample of data layers."""
 
 
-def samples(count: int) -> Iterator[Sample]:
-    """`count` samples; just the centre where one is asked."""
+def samples(count: int, kind: Filter = "box", width: float = 1.0) -> Iterator[Sample]:
+    """`count` samples, spread over pixels by a filter; just the centre where one is asked."""
     if count == 1:
         yield CENTRE
         return
     for i in range(count):
-        yield Sample(i, owen_sobol(i, _PIXEL), owen_sobol(i, _TEXEL), owen_sobol(i, _LENS))
+        dx, dy = filter_offset(kind, width, owen_sobol(i, _PIXEL))
+        yield Sample(i, (0.5 + dx, 0.5 + dy), owen_sobol(i, _TEXEL), owen_sobol(i, _LENS))
 
 
 def owen_sobol(index: int, pattern: int) -> Pair:

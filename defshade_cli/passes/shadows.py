@@ -172,8 +172,7 @@ class ShadowPass:
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = ">"
         self._context.polygon_offset = _DEPTH_OFFSET
-        vertices = [part for part in draws.vertices if any(name in self._program for name in part[2:])]
-        array = self._context.vertex_array(self._program, vertices, draws.indices)
+        array = self._context.vertex_array(self._program, draws.vertices_of(self._program), draws.indices)
         first = 0
         for tile, (row, seen) in enumerate(zip(records, commands, strict=True)):
             x, y = tile % TILES, tile // TILES

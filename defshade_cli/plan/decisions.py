@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from defshade_cli.gpu.planes import PLANES
-from defshade_cli.image.layers import LAYERS
 
 if TYPE_CHECKING:
     from defshade_cli.plan.plan import Plan
@@ -27,7 +26,8 @@ def explain(plan: Plan) -> Iterator[Decision]:
     yield Decision("layout", plan.layout, "as asked")
     yield _explain_subdivision(plan)
     for plane in PLANES:
-        yield _kept(f"plane {plane.name}", plane in plan.planes, "a material or layer needs it", "nothing needs it")
+        kept = plane in plan.planes or plane in plan.data_planes
+        yield _kept(f"plane {plane.name}", kept, "a material or layer needs it", "nothing needs it")
     for volume in ("quad", "sphere", "cone"):
         count = sum(planned.volume == volume for planned in plan.lights)
         yield Decision(f"{volume} volumes", f"{count} drawn" if count else "skipped", "lights that reach geometry")
@@ -35,9 +35,9 @@ def explain(plan: Plan) -> Iterator[Decision]:
     yield _kept("environment", bool(plan.domes), "a dome lights the scene", "no dome")
     yield _kept("cutout", plan.cutout, "some opacity is or may be below 1", "no opacity is below 1")
     yield _kept("textures", plan.textures, "a material reads them", "no material reads any")
-    if any(LAYERS[name].source != "lighting" for name in plan.layers):
+    if plan.data_layers:
         jittered, shared = "the beauty's is jittered, quantised or dithered", "the beauty's own float sample serves"
-        yield _kept("data GBuffer", plan.data_pass or not plan.lit, jittered if plan.lit else "as asked", shared)
+        yield _kept("data GBuffer", plan.data_pass, jittered if plan.sampled else "as asked", shared)
     if not plan.lit:
         yield Decision("lighting", "skipped", "no layer needs it")
 

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.errors import UsageError
-from defshade_cli.gpu.planes import Plane, needed_planes
-from defshade_cli.image.layers import LAYERS
+from defshade_cli.gpu.planes import MOST_TARGETS, Plane, named_planes, needed_planes
+from defshade_cli.image.layers import LAYERS, resolve
 from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
-from defshade_cli.settings import Complexity, Layout, RenderSettings, Shading
+from defshade_cli.scene.window import DataWindow, from_ndc
+from defshade_cli.settings import FILTERS, Complexity, Filter, Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
 from defshade_cli.units import exposure_scale
 
@@ -27,24 +27,33 @@ _MARGIN = 1e-3  # relative slack around bounds that float32 may round outwards
 class Plan:
     """All that the passes read beside the Scene.
 
-    camera: conformed to the image.  clip: (near, far), the camera's range tightened to the geometry.
+    display, display_camera: the whole image, and the camera conformed to it.
+    window: the part of it that is rendered; size and camera are its own.
+    clip: (near, far), the camera's range tightened to the geometry.
     exposure: linear, the camera's and the settings' together.
-    planes: of the GBuffer; lights: sorted quads, spheres, cones.
+    filter_width: pixels.
+    planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
+    lights: sorted quads, spheres, cones.
     shadows: some light casts them.  background: domes are seen where no geometry is.
     cutout: some opacity may be below 1.  textures: some material reads them.
     data_pass: data layers need an unjittered float GBuffer of their own.
     levels: how often subdivision surfaces were refined, ascending; empty without any.
     """
 
-    size: tuple[int, int]
+    display: tuple[int, int]
+    display_camera: Camera
+    window: DataWindow
     camera: Camera
     clip: tuple[float, float]
     exposure: float
     layout: Layout
     shading: Shading
     samples: int
+    filter: Filter
+    filter_width: float
     layers: tuple[str, ...]
     planes: tuple[Plane, ...]
+    data_planes: tuple[Plane, ...]
     lights: tuple[PlannedLight, ...]
     shadows: bool
     background: bool
@@ -55,9 +64,28 @@ class Plan:
     levels: tuple[int, ...]
 
     @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) of what is rendered, in pixels."""
+        return self.window.size
+
+    @property
     def lit(self) -> bool:
         """Does any layer need the lighting?"""
         return any(LAYERS[name].source == "lighting" for name in self.layers)
+
+    @property
+    def sampled(self) -> bool:
+        """Is any layer a mean of samples?"""
+        return any(LAYERS[name].is_sampled for name in self.layers)
+
+    @property
+    def data_layers(self) -> tuple[str, ...]:
+        """Those read from planes at the pixels' centres."""
+        return tuple(name for name in self.layers if not LAYERS[name].is_sampled)
+
+    def reads(self, define: str) -> bool:
+        """Must the GBuffer's shaders interpolate what `define` names?"""
+        return any(define in plane.inputs for plane in (*self.planes, *self.data_planes))
 
     @property
     def domes(self) -> tuple[DomeLight, ...]:
@@ -74,8 +102,7 @@ class Plan:
         before = ("gbuffer", "emission", *("environment",) * bool(self.domes), *("shadow maps",) * self.shadows)
         lighting = before + tuple(f"light {volume}" for volume in self.volumes)
         accumulation = ("accumulation",) * (self.samples > 1)
-        data = ("data gbuffer",) * (self.data_pass or not self.lit)
-        return (lighting + accumulation if self.lit else ()) + data
+        return (lighting + accumulation if self.sampled else ()) + ("data gbuffer",) * self.data_pass
 
     @property
     def decisions(self) -> tuple[Decision, ...]:
@@ -85,26 +112,31 @@ class Plan:
 
 def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     """Decide. Raises UsageError for a layer that does not exist or an image without pixels."""
-    _check_layers(settings.layers)
-    size = image_size(scene.camera.aspect, settings.size, settings.width, scene.resolution)
-    camera = scene.camera.conformed(size[0] * scene.pixel_aspect / size[1], scene.conform)
+    layers = resolve(settings.layers)
+    display = image_size(scene.camera.aspect, settings.size, settings.width, scene.resolution)
+    display_camera = scene.camera.conformed(display[0] * scene.pixel_aspect / display[1], scene.conform)
+    window = DataWindow(*settings.crop) if settings.crop else from_ndc(scene.data_window, display)
+    camera = replace(display_camera, window=window.of(display_camera.window, display))
     exposure = camera.exposure * exposure_scale(settings.exposure)
-    lights = plan_lights(scene, exposure, settings)
-    planes = needed_planes(scene.materials, settings.layers)
+    lights = _seen_lights(plan_lights(scene, exposure, settings), layers)
     cutout = _has_cutout(scene)
+    planes, data_planes, data_pass = _divide_planes(scene, settings, layers, cutout)
     shadows = settings.shadows and bool(scene.drawables) and any(p.light.casts_shadow for p in lights)
-    data_layers = [name for name in settings.layers if LAYERS[name].source != "lighting"]
-    data_pass = bool(data_layers) and (settings.layout != "float" or settings.samples > 1 or cutout)
     return Plan(
-        size=size,
+        display=display,
+        display_camera=display_camera,
+        window=window,
         camera=camera,
         clip=_tight_clip(camera, scene.bounds),
         exposure=exposure,
         layout=settings.layout,
         shading=settings.shading,
         samples=settings.samples,
-        layers=settings.layers,
+        filter=settings.filter,
+        filter_width=settings.filter_width or FILTERS[settings.filter],
+        layers=layers,
         planes=planes,
+        data_planes=data_planes,
         lights=lights,
         shadows=shadows,
         background=settings.background,
@@ -116,10 +148,29 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     )
 
 
-def _check_layers(names: tuple[str, ...]) -> None:
-    unknown = [name for name in names if name not in LAYERS]
-    if unknown or not names:
-        raise UsageError(f"no layer named {', '.join(unknown) or '(none given)'}; there are {', '.join(LAYERS)}")
+def _seen_lights(lights: tuple[PlannedLight, ...], layers: tuple[str, ...]) -> tuple[PlannedLight, ...]:
+    """All lights for a lit layer; for mere coverage the domes, which cover what is behind the geometry."""
+    if any(LAYERS[name].source == "lighting" for name in layers):
+        return lights
+    return tuple(planned for planned in lights if isinstance(planned.light, DomeLight))
+
+
+def _divide_planes(
+    scene: Scene, settings: RenderSettings, layers: tuple[str, ...], cutout: bool
+) -> tuple[tuple[Plane, ...], tuple[Plane, ...], bool]:
+    """Planes of the samples' GBuffer, planes of the data layers, and whether these need a GBuffer of their own.
+
+    One exact sample at the pixels' centres serves both, unless it is jittered, quantised or dithered, or the planes
+    are too many.
+    """
+    rows = [LAYERS[name] for name in layers]
+    lit = needed_planes(scene.materials) if any(row.source == "lighting" for row in rows) else ()
+    data = named_planes(row.source for row in rows)
+    both = named_planes(plane.name for plane in (*lit, *data))
+    sampled, has_data = any(row.is_sampled for row in rows), not all(row.is_sampled for row in rows)
+    exact = settings.layout == "float" and settings.samples == 1 and not cutout and len(both) <= MOST_TARGETS
+    data_pass = has_data and not (sampled and exact)
+    return (lit if data_pass or not has_data else both), data, data_pass
 
 
 def _has_cutout(scene: Scene) -> bool:

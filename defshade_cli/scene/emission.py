@@ -32,7 +32,7 @@ from defshade_cli.scene.light import (
     RectLight,
     SphereLight,
 )
-from defshade_cli.spaces import frame_along, is_similarity, normalize, transform_points
+from defshade_cli.spaces import is_similarity, normalize, transform_points
 
 Vector = NDArray[np.float64]
 Place = tuple[float, float, float]
@@ -111,7 +111,9 @@ def _within_ball(light: SphereLight, u: Place) -> Emitter:
     x, y = _circle(u[1], light.radius * math.sqrt(u[0]))
     z = light.radius * math.sqrt(1.0 - u[0]) * math.sin(math.pi * (u[2] - 0.5))
     position = transform_points(light.world_from_light, np.array([x, y, z]))
-    return Emitter(position, light.axis, light.axis, "uniform", light.intensity_on_axis, math.pi * light.world_radius**2)
+    return Emitter(
+        position, light.axis, light.axis, "uniform", light.intensity_on_axis, math.pi * light.world_radius**2
+    )
 
 
 def _distant(light: DistantLight, u: Place) -> Emitter:

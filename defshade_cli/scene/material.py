@@ -23,6 +23,7 @@ TEXTURED_FIELDS = (
     "clearcoat_roughness",
     "opacity",
     "ior",
+    "occlusion",
     "normal",
 )
 """What a texture may feed: fields of Material, and the normal in tangent space, which has no constant."""
@@ -50,6 +51,7 @@ class Material:
     opacity_threshold: float = 0.0
     opacity_mode: Literal["transparent", "presence"] = "transparent"
     ior: float = 1.5
+    occlusion: float = 1.0
     uses_display_color: bool = False
     inputs: Mapping[str, TextureInput] = field(default_factory=dict, hash=False)
 

@@ -13,6 +13,7 @@ from defshade_cli.scene.geometry import Drawable, Mesh, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.texture import Texture
+from defshade_cli.scene.window import WHOLE_IMAGE
 from defshade_cli.spaces import ConformPolicy
 
 
@@ -30,7 +31,8 @@ class Scene:
 
     camera: the one to render; cameras: the paths of all that the stage has.
     frame: time code, None for the default time.
-    resolution, pixel_aspect, conform: of the stage's UsdRenderSettings, where it names one.
+    resolution, pixel_aspect, conform, data_window: of the stage's UsdRenderSettings, where it names one; the window
+        is (xmin, ymin, xmax, ymax), 0..1 over the image, y up.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Scene:
     resolution: tuple[int, int] | None = None
     pixel_aspect: float = 1.0
     conform: ConformPolicy = "expandAperture"
+    data_window: tuple[float, float, float, float] = WHOLE_IMAGE
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:

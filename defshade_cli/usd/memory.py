@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from pxr import Sdf, Usd, UsdGeom
 
+from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.usd.binding import Bindings, read_bindings
 from defshade_cli.usd.geometry import Surface, is_time_varying, read_surface
 from defshade_cli.usd.kind import Kinds
@@ -18,10 +19,10 @@ class Memory:
     kinds: of prims.  xforms: USD's cache, which drops only what varies when its time is set.
     """
 
-    def __init__(self, stage: Usd.Stage) -> None:
+    def __init__(self, stage: Usd.Stage, extras: Extras = NO_EXTRAS) -> None:
         self.kinds = Kinds()
         self.xforms = UsdGeom.XformCache()
-        self._stage = stage
+        self._stage, self._extras = stage, extras
         self._surfaces: dict[Sdf.Path, tuple[Usd.TimeCode, Surface | None]] = {}
         self._time_varying: dict[Sdf.Path, bool] = {}
         self._bindings: dict[Sdf.Path, Bindings] = {}
@@ -42,7 +43,7 @@ class Memory:
     def material(self, path: Sdf.Path, time: Usd.TimeCode) -> ReadMaterial:
         if path in self._materials:
             return self._materials[path]
-        read = read_material(self._stage, path, self.shown(path), time)
+        read = read_material(self._stage, path, self.shown(path), time, occlusion=self._extras.occlusion)
         if not read.time_varying:
             self._materials[path] = read
         return read

@@ -11,6 +11,7 @@ from pxr import Usd
 
 from defshade_cli.errors import EmptyStage
 from defshade_cli.scene.camera import Camera, image_size
+from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import UNBOUND
@@ -27,6 +28,7 @@ from defshade_cli.usd.palette import Palette
 from defshade_cli.usd.settings import read_settings
 from defshade_cli.usd.tessellation import Tessellation
 from defshade_cli.usd.traversal import Traversal
+from defshade_cli.usd.unresolved import find_unresolved
 
 log = logging.getLogger("defshade")
 
@@ -38,6 +40,7 @@ class StageReader:
 
     camera: path or name; without it the rule of usd/camera.py picks.  purposes: of the geometry that is drawn.
     complexity: of subdivision surfaces; for `auto` it matters how large the image is, see scene.camera.image_size.
+    extras: what only some layers need.
     Raises PrimNotFound for a camera that the stage lacks.
     """
 
@@ -50,13 +53,15 @@ class StageReader:
         complexity: Complexity = "auto",
         size: tuple[int, int] | None = None,
         width: int | None = None,
+        extras: Extras = NO_EXTRAS,
     ) -> None:
         self._stage, self._purposes = stage, tuple(purposes)
         self._complexity, self._size, self._width = complexity, size, width
-        self._memory = Memory(stage)
+        self._memory = Memory(stage, extras)
         self._tessellation = Tessellation()
         self._settings = read_settings(stage)
         self._cameras = find_cameras(stage)
+        self._issues = tuple(arc.unsupported for arc in find_unresolved(stage))
         self._camera = choose_camera(stage, self._cameras, camera, self._settings.camera)
 
     @property
@@ -99,7 +104,7 @@ class StageReader:
             lights=tuple(_lights(pieces)),
             camera=camera,
             cameras=self._cameras,
-            unsupported=(*traversal.issues, *mended, *palette.issues, *camera_issues, *self._settings.issues),
+            unsupported=(*self._issues, *traversal.issues, *mended, *palette.issues, *camera_issues),
             meters_per_unit=facts.meters_per_unit(self._stage),
             up_axis=facts.up_axis(self._stage),
             frame=frame,
@@ -107,6 +112,7 @@ class StageReader:
             resolution=self._settings.resolution,
             pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
+            data_window=self._settings.data_window,
         )
 
     def _read_camera(

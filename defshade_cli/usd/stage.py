@@ -10,39 +10,48 @@ from contextlib import contextmanager
 from pathlib import Path, PurePath
 from typing import Any
 
-from pxr import Tf, Usd, UsdGeom, UsdUtils
+from pxr import Usd, UsdGeom, UsdUtils
 
-from defshade_cli.errors import StageNotFound
+from defshade_cli.settings import Composition
+from defshade_cli.usd.composition import compose
+from defshade_cli.usd.unresolved import find_unresolved, summary
 
 log = logging.getLogger("defshade")
 
 _ADDRESS = re.compile(r"\s*<0x[0-9a-f]+>")
+_AROUND = re.compile(r"\AIn <[^>]*>: | \((?:instantiating|recomposing) stage on [^)]*\)\Z")
+_AS_AUTHORED = Composition()
 
 
-def open_stage(path: Path) -> Usd.Stage:
-    """Open a .usd, .usda, .usdc or .usdz file with all its payloads.
+def open_stage(path: Path, composition: Composition = _AS_AUTHORED, camera: str | None = None) -> Usd.Stage:
+    """Open a .usd, .usda, .usdc or .usdz file. What it refers to and is missing is logged.
 
-    Raises StageNotFound where there is no such file or USD cannot read it.
+    camera: as the user names it, which a mask does not hide.  Raises as usd.composition.compose.
     """
-    if not path.exists():
-        raise StageNotFound(f"no such file: {path}")
-    with gathered_diagnostics():
-        try:
-            return Usd.Stage.Open(str(path))
-        except Tf.ErrorException as error:
-            raise StageNotFound(f"{path} is not a USD stage: {_first_line(error)}") from None
+    with gathered_diagnostics() as told:
+        stage = compose(path, composition, camera)
+        unresolved = find_unresolved(stage)
+        told.update(arc.text for arc in unresolved)
+    if unresolved:
+        log.warning("%s", summary(unresolved))
+    return stage
 
 
 @contextmanager
-def gathered_diagnostics() -> Iterator[None]:
-    """Log what USD complains about inside the block, one line for each kind, in place of its own lines on stderr."""
-    delegate = UsdUtils.CoalescingDiagnosticDelegate()
+def gathered_diagnostics() -> Iterator[set[str]]:
+    """Log what USD complains about inside the block, one line for each kind, in place of its own lines on stderr.
+
+    Gives a set for the complaints that the block tells of itself.
+    """
+    delegate, told = UsdUtils.CoalescingDiagnosticDelegate(), set[str]()
     try:
-        yield
+        yield told
     finally:
         for kind in delegate.TakeCoalescedDiagnostics():
-            first, *more = (_ADDRESS.sub("", item.commentary).strip() for item in kind.unsharedItems)
-            log.warning("USD: %s%s", first, f" (and {len(more)} more like it)" if more else "")
+            complaints = [_ADDRESS.sub("", item.commentary).strip() for item in kind.unsharedItems]
+            first, *more = [text for text in complaints if _core(text) not in told] or [""]
+            if first:
+                log.warning("USD: %s%s", first, f" (and {len(more)} more like it)" if more else "")
 
 
 def stage_name(stage: Usd.Stage) -> str:
@@ -86,5 +95,6 @@ def _positive(stage: Usd.Stage, key: str, fallback: float) -> float:
     return fallback
 
 
-def _first_line(error: Tf.ErrorException) -> str:
-    return str(error.args[0].commentary).strip().partition("\n")[0]
+def _core(complaint: str) -> str:
+    """A complaint of composition without the prim and the stage that USD puts around it."""
+    return _AROUND.sub("", complaint)

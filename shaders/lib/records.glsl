@@ -33,6 +33,7 @@ struct Material {
     uint uses_display_color;
     uint first_input;          // of its textures
     uint input_count;
+    float occlusion;
 };
 
 struct TextureInput {

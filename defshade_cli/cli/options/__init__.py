@@ -16,7 +16,7 @@ from defshade_cli.cli.options.output import output_options
 from defshade_cli.cli.options.run import Reporting, run_options
 from defshade_cli.cli.options.stage import stage_options
 from defshade_cli.errors import UsageError
-from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
+from defshade_cli.settings import Composition, OutputSettings, RenderJob, RenderSettings
 
 __all__ = [
     "Function",
@@ -78,10 +78,12 @@ def make_job(values: dict[str, Any]) -> RenderJob:
         raise UsageError("--size and --width exclude each other")
     if values["frames"] and values["default_time"]:
         raise UsageError("--frames and --default-time exclude each other")
+    values["mask"] = values["mask"] or ()
     default_time = values.pop("default_time")
     values["frames"] = (None,) if default_time else values["frames"] or ()
     return RenderJob(
         stage=values.pop("scene"),
+        composition=Composition(**take(values, Composition)),
         settings=RenderSettings(**take(values, RenderSettings)),
         output=OutputSettings(**take(values, OutputSettings)),
         **take(values, RenderJob),

@@ -9,8 +9,8 @@ import click
 
 from defshade_cli import settings
 from defshade_cli.cli.options.option import Function, Option
-from defshade_cli.cli.types import Finite, Names, Size
-from defshade_cli.image.layers import LAYERS
+from defshade_cli.cli.options.sampling import sampling_options
+from defshade_cli.cli.types import Crop, Finite, Layers, Size
 from defshade_cli.settings import RenderSettings
 
 _RENDER = RenderSettings()
@@ -33,22 +33,22 @@ def image_options(layers: Sequence[str]) -> list[Function]:
             help="Width in pixels; the height follows the camera's aspect.",
         ),
         option(
-            "--samples",
-            type=click.IntRange(min=1),
-            default=_RENDER.samples,
-            default_text=str(_RENDER.samples),
-            metavar="N",
-            help="Samples a pixel of the beauty: places in the pixel, on the lens and on every light. One sample takes "
-            "lights for points. Data layers are one sample at the pixel's centre.",
+            "--crop",
+            type=Crop(),
+            metavar="WxH+X+Y",
+            help="Part of the image to render: WxH pixels from X, Y on, from the top left; what lies beyond the image "
+            "is overscan. The default is the stage's data window.",
         ),
         option(
             "--layers",
-            type=Names("layer", tuple(LAYERS)),
+            type=Layers(),
             metavar="NAMES",
             default=tuple(layers),
             default_text=",".join(layers),
-            help="Layers to write, with commas between, of those listed below; or 'all'.",
+            help="Layers to write, with commas between, of those listed below or by their names in Hydra, "
+            "Arnold and Blender; 'all' for all that are listed.",
         ),
+        *sampling_options(),
         *_shading_options(),
     ]
 

@@ -8,6 +8,7 @@ import click
 
 from defshade_cli import settings
 from defshade_cli.cli.options.option import Function, Option
+from defshade_cli.cli.types import OneOf
 from defshade_cli.settings import OutputSettings
 
 _OUTPUT = OutputSettings()
@@ -48,6 +49,17 @@ def output_options(name: str) -> list[Function]:
             help="Compression of EXR.",
         ),
         option("--split-layers", is_flag=True, help="One file a layer in place of one file with all."),
+        option("--multipart", is_flag=True, help="One part a layer inside the EXR."),
+        option("--tiled", is_flag=True, help="EXR in tiles in place of scanlines."),
+        option("--mipmaps", is_flag=True, help="EXR in tiles, with all smaller levels."),
+        option(
+            "--bits",
+            type=OneOf(settings.BITS),
+            metavar="8|16",
+            help="Bits a channel of pictures. The default is 16 for TIFF, 8 for the others.",
+        ),
+        option("--dither", is_flag=True, help="Dither the colours of 8-bit pictures, so that gradients show no bands."),
+        option("--verify", is_flag=True, help="Read each file back and compare, before it takes its name."),
         option("--display", metavar="NAME", help="OCIO display for formats such as PNG, not for EXR."),
         option("--view", metavar="NAME", help="OCIO view of the display."),
     ]

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import functools
+from pathlib import Path
 
 import click
 
 from defshade_cli import settings
 from defshade_cli.cli.options.option import Function, Option
-from defshade_cli.cli.types import Frames, Names
-from defshade_cli.settings import RenderSettings
+from defshade_cli.cli.types import Frames, Names, PrimPaths, Variant
+from defshade_cli.settings import Composition, RenderSettings
 
 _RENDER = RenderSettings()
+_COMPOSITION = Composition()
 
 
 def stage_options() -> list[Function]:
@@ -37,5 +39,43 @@ def stage_options() -> list[Function]:
             default=_RENDER.purposes,
             default_text=",".join(_RENDER.purposes),
             help=f"Purposes to draw, with commas between, of: {', '.join(settings.PURPOSES)}.",
+        ),
+        *_composition_options(),
+    ]
+
+
+def _composition_options() -> list[Function]:
+    option = functools.partial(click.option, cls=Option, heading="Stage")
+    return [
+        option(
+            "--variant",
+            "variants",
+            type=Variant(),
+            multiple=True,
+            metavar="PRIM{SET=NAME}",
+            help="Choose a variant, over what the stage chooses; repeatable, in order: '/Car{color=red}'.",
+        ),
+        option(
+            "--mask",
+            type=PrimPaths(),
+            metavar="PRIMS",
+            help="Limit the stage to these prims, with commas between, and to what stands above and below them. What "
+            "they refer to, such as materials, is there too, and a camera given by its path; lights are not, unless "
+            "the mask names them.",
+        ),
+        option(
+            "--session-layer",
+            "session_layers",
+            type=click.Path(path_type=Path),
+            multiple=True,
+            metavar="FILE",
+            help="USD file laid over the stage; repeatable, the first is the strongest.",
+        ),
+        option(
+            "--payloads",
+            type=click.Choice(settings.PAYLOADS),
+            default=_COMPOSITION.payloads,
+            default_text=str(_COMPOSITION.payloads),
+            help="Whether payloads are loaded.",
         ),
     ]

@@ -1,0 +1,45 @@
+"""How many samples a pixel gets, and where they fall."""
+
+from __future__ import annotations
+
+import functools
+
+import click
+
+from defshade_cli import settings
+from defshade_cli.cli.options.option import Function, Option
+from defshade_cli.cli.types import Positive
+from defshade_cli.settings import RenderSettings
+
+_RENDER = RenderSettings()
+_WIDTHS = ", ".join(f"{width:g} for {name}" for name, width in settings.FILTERS.items())
+
+
+def sampling_options() -> list[Function]:
+    """Under the heading Image."""
+    option = functools.partial(click.option, cls=Option, heading="Image")
+    return [
+        option(
+            "--samples",
+            type=click.IntRange(min=1),
+            default=_RENDER.samples,
+            default_text=str(_RENDER.samples),
+            metavar="N",
+            help="Samples a pixel of the beauty: places in the pixel, on the lens and on every light. One sample takes "
+            "lights for points. Data layers are one sample at the pixel's centre.",
+        ),
+        option(
+            "--filter",
+            type=click.Choice(tuple(settings.FILTERS)),
+            default=_RENDER.filter,
+            default_text=_RENDER.filter,
+            help="Pixel filter by which the samples of the beauty fall, from the second on.",
+        ),
+        option(
+            "--filter-width",
+            type=Positive(),
+            metavar="PIXELS",
+            default_text=_WIDTHS,
+            help="Width of the filter, from end to end.",
+        ),
+    ]

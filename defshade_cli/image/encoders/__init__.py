@@ -1,0 +1,39 @@
+"""The formats of image files, and what each holds of a film."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from defshade_cli.errors import UsageError
+from defshade_cli.image.encoders.exr import write_exr
+from defshade_cli.image.encoders.pictures import PICTURES, write_picture
+from defshade_cli.image.film import Film
+from defshade_cli.settings import OutputSettings
+
+EXR = ".exr"
+SUFFIXES = (EXR, *PICTURES)
+
+
+def suffix_of(path: Path) -> str:
+    """The suffix in lower case. Raises UsageError for one that no encoder has."""
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise UsageError(f"'{path}': no format for the suffix '{path.suffix}'; write {', '.join(SUFFIXES)}")
+    return suffix
+
+
+def check_format(path: Path, output: OutputSettings) -> None:
+    """Raises UsageError for a suffix that no encoder has, and for bits a channel that the format lacks."""
+    suffix = suffix_of(path)
+    if suffix != EXR and output.bits and output.bits not in PICTURES[suffix].bits:
+        depths = " or ".join(map(str, PICTURES[suffix].bits))
+        raise UsageError(f"'{path}': the format has {depths} bits a channel, not {output.bits}")
+
+
+def encode(film: Film, names: tuple[str, ...], output: OutputSettings, path: Path) -> None:
+    """Write layers to `path`: all as EXR, the only one as a picture. Raises OSError with the reason."""
+    if suffix_of(path) == EXR:
+        write_exr(film, names, output, path)
+    else:
+        (name,) = names
+        write_picture(film, name, output, path)

@@ -1,0 +1,82 @@
+"""Pictures to look at: display-referred, one layer a file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from defshade_cli.image.colour import display_space, picture
+from defshade_cli.image.encoders.sink import bounded, make_spec, opened, set_attributes
+from defshade_cli.image.film import Film
+from defshade_cli.image.layers import LAYERS
+from defshade_cli.image.metadata import text_attributes
+from defshade_cli.settings import OutputSettings
+
+Hint = tuple[str, str | int]
+
+_DITHER_SEED = 1  # equal films, equal files
+
+
+@dataclass(frozen=True, slots=True)
+class PictureFormat:
+    """bits: a channel, the default first.  hints: attributes for the encoder.
+
+    fails_badly: on a full disk the encoder ends the process (libjpeg) or never returns (libwebp), so the space is
+        claimed beforehand.
+    """
+
+    bits: tuple[int, ...] = (8,)
+    alpha: bool = True
+    hints: tuple[Hint, ...] = ()
+    fails_badly: bool = False
+
+
+_JPEG = PictureFormat(alpha=False, hints=(("compression", "jpeg:95"), ("jpeg:subsampling", "4:4:4")), fails_badly=True)
+_TIFF = PictureFormat((16, 8), hints=(("compression", "zip"), ("Exif:ColorSpace", 65535)))
+"""Uncalibrated, unless the display is sRGB: an Exif block without any entry is reported as a failure."""
+
+PICTURES = {
+    ".png": PictureFormat((8, 16), hints=(("png:compressionLevel", 1),)),
+    ".jpg": _JPEG,
+    ".jpeg": _JPEG,
+    ".jxl": PictureFormat((8, 16), hints=(("compression", "jpegxl:100"),)),
+    ".tif": _TIFF,
+    ".tiff": _TIFF,
+    ".webp": PictureFormat(hints=(("compression", "lossless"),), fails_badly=True),
+    ".tga": PictureFormat(),
+    ".bmp": PictureFormat(alpha=False),
+    ".ppm": PictureFormat(alpha=False, hints=(("pnm:pfmflip", 0),)),  # else OpenImageIO writes it upside down
+}
+
+
+def write_picture(film: Film, name: str, output: OutputSettings, path: Path) -> None:
+    """Write the layer `name` as it looks. Raises OSError with the reason."""
+    form, layer = PICTURES[path.suffix.lower()], LAYERS[name]
+    pixels = bounded(name, film.layers[name], half=layer.is_color)
+    shown = picture(layer, pixels, alpha=form.alpha, display=output.display, view=output.view)
+    bits = output.bits or form.bits[0]
+    spec = make_spec(film, shown.shape[-1], f"uint{bits}")
+    if layer.is_color:
+        spec.set_colorspace(display_space(output.display, output.view))
+    for hint, value in (*form.hints, *_hints(dithered=output.dither and layer.is_color and bits == 8)):
+        spec.attribute(hint, value)
+    set_attributes(spec, text_attributes(film))
+    if form.fails_badly:
+        _claim(path, spec.image_bytes())
+    with opened(path, [spec]) as encoder:
+        encoder.write_image(np.ascontiguousarray(shown))
+
+
+def _hints(*, dithered: bool) -> Iterator[Hint]:
+    yield "oiio:UnassociatedAlpha", 1
+    if dithered:
+        yield "oiio:dither", _DITHER_SEED
+
+
+def _claim(path: Path, size: int) -> None:
+    with path.open("wb") as file:
+        os.posix_fallocate(file.fileno(), 0, size + 2**16)
