@@ -3,6 +3,7 @@
 #include "lib/cutout.glsl"
 #include "lib/detail.glsl"
 #include "lib/material.glsl"
+#include "lib/render_space.glsl"
 #ifdef TEXTURES
 #include "lib/texture.glsl"
 #endif
@@ -26,16 +27,16 @@ in vec2 layer_uv;
 Surface surface_of(Material material, vec3 normal) {
     Surface s;
     s.normal = normal;
-    s.base = material.diffuse_color;
+    s.base = render_from_rec709(material.diffuse_color);
     s.metallic = material.metallic;
     s.roughness = material.roughness;
-    s.emission = material.emissive_color;
+    s.emission = render_from_rec709(material.emissive_color);
     s.clearcoat = material.clearcoat;
     s.clearcoat_roughness = material.clearcoat_roughness;
     set_metallic_fresnel(s, F0_from_ior(material.ior));
     if (material.use_specular_workflow != 0u) {
         s.metallic = 0.0;
-        s.f0 = material.specular_color;
+        s.f0 = render_from_rec709(material.specular_color);
         s.f90 = vec3(1.0);
     }
     return s;

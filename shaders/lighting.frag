@@ -2,6 +2,7 @@
 #include "lib/surface.glsl"
 #include "lib/light.glsl"
 #include "lib/shadow.glsl"
+#include "lib/render_space.glsl"
 #include "generated/planes.glsl"
 
 // A lobe that is wider by the patch of light that one point stands for.
@@ -40,5 +41,5 @@ void main() {
         surface.clearcoat_roughness = widened_roughness(surface.clearcoat_roughness, widening);
     }
     vec3 f = evaluate_brdf(surface, direction_to_eye(position), l, lobe_response(lights[light_index], surface));
-    radiance = vec4(view.exposure * irradiance * f, 0.0);
+    radiance = vec4(view.exposure * render_from_rec709(irradiance) * f, 0.0);
 }

@@ -28,9 +28,6 @@ from defshade_cli.spaces import Matrix
 
 PREFIX = "defshade/"
 
-REC709_D65 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-"""Chromaticities of red, green, blue and white: ITU-R BT.709-6."""
-
 
 class Attribute(NamedTuple):
     """One header entry. type: OpenImageIO's name of it."""
@@ -42,8 +39,9 @@ class Attribute(NamedTuple):
 
 def exr_attributes(film: Film, layers: tuple[str, ...]) -> Iterator[Attribute]:
     """All that an EXR with these layers carries, its colour space and compression apart."""
-    if any(LAYERS[name].is_color for name in layers):
-        yield Attribute("chromaticities", "float[8]", REC709_D65)
+    chromaticities = film.render_space.chromaticities
+    if chromaticities and any(LAYERS[name].is_color for name in layers):
+        yield Attribute("chromaticities", "float[8]", chromaticities)
     yield from _camera(film)
     yield Attribute("FramesPerSecond", "rational", frame_rate(film.frames_per_second))
     yield from text_attributes(film)

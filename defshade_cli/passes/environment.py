@@ -13,8 +13,10 @@ import numpy as np
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import Plane, read_source
+from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.targets import Target
 from defshade_cli.image.environment import sky_of
+from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.plan import Plan
 from defshade_cli.scene.environment import Environment
@@ -34,16 +36,17 @@ class EnvironmentVariant:
     orthographic: bool
     analytic: bool
     background: bool
+    space: RenderSpace = REC709
 
     @classmethod
     def of(cls, plan: Plan) -> EnvironmentVariant:
         orthographic = plan.camera.projection == "orthographic"
-        return cls(plan.planes, plan.layout, orthographic, plan.samples == 1, plan.background)
+        return cls(plan.planes, plan.layout, orthographic, plan.samples == 1, plan.background, plan.render_space)
 
     @property
     def defines(self) -> list[str]:
         flags = ["ORTHOGRAPHIC"] * self.orthographic + ["ANALYTIC"] * self.analytic + ["BACKGROUND"] * self.background
-        return [plane.define for plane in self.planes] + flags
+        return [plane.define for plane in self.planes] + flags + space_defines(self.space)
 
 
 class EnvironmentPass:

@@ -8,9 +8,11 @@ import moderngl
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import Plane, uses_standard_depth, write_source
+from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.residence import DrawList
 from defshade_cli.gpu.targets import Target, allocate
 from defshade_cli.gpu.textures import textures_source
+from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.settings import Layout
 
 
@@ -22,7 +24,7 @@ class GBuffer:
     planes: tuple[Plane, ...]
     layout: Layout
 
-    def bind(self, program: moderngl.Program, **others: moderngl.Texture | None) -> None:
+    def bind(self, program: moderngl.Program, **others: moderngl.Texture | moderngl.TextureArray | None) -> None:
         """Let `program` read the planes, and `others` by the names of their samplers, where it has those."""
         textures = {f"plane_{name}": texture for name, texture in self.target.textures.items()}
         bound = {**textures, "plane_depth": self.target.depth, **others}
@@ -50,13 +52,14 @@ class GBufferVariant:
     cutout: bool
     color_varies: bool
     texture_groups: int = 0
+    space: RenderSpace = REC709
 
     @property
     def defines(self) -> list[str]:
         flags = ["CUTOUT"] * self.cutout + ["DISPLAY_COLOR_VARIES"] * self.color_varies
         flags += ["TEXTURES", "POSITION"] * bool(self.texture_groups)
         inputs = [name for plane in self.planes for name in plane.inputs]
-        return list(dict.fromkeys([plane.define for plane in self.planes] + flags + inputs))
+        return list(dict.fromkeys([plane.define for plane in self.planes] + flags + inputs)) + space_defines(self.space)
 
 
 class GBufferPass:

@@ -18,6 +18,7 @@ from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
 from defshade_cli.passes.lighting import LightingPass, LightingVariant, light_records
+from defshade_cli.passes.profiles import ProfileTables
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
 from defshade_cli.passes.shadows import ShadowPass
@@ -44,6 +45,7 @@ class Pipeline:
                 gpu, cutout=cutout, color_varies=color_varies, texture_groups=texture_groups
             )
         )
+        self._profiles = ProfileTables(gpu)
         self._accumulation = AccumulationPass(gpu)
 
     def render(self, scene: Scene, plan: Plan) -> Film:
@@ -60,6 +62,7 @@ class Pipeline:
             camera=plan.display_camera,
             origin=plan.window.origin,
             display=plan.display,
+            render_space=plan.render_space,
             scene_name=scene.name,
             frame=scene.frame,
             frames_per_second=scene.frames_per_second,
@@ -93,14 +96,15 @@ class Pipeline:
         lighting.begin(gbuffer, radiance)
         for dome in plan.domes:
             self._environment_pass(EnvironmentVariant.of(plan)).draw(dome, gbuffer, radiance)
+        profiles = self._profiles.update(plan.profiles)
         for batch in light_batches(scene, plan, sample) if plan.lit else ():
             shadows = None
             if plan.shadows:
                 shadow_pass = self._shadow_pass(plan.cutout, draws.color_varies, draws.texture_groups)
                 shadows = shadow_pass.draw(draws, [lit.shadow_cameras for lit in batch], sample.texel_offset)
             lights, emitters = [lit.planned for lit in batch], [lit.emitter for lit in batch]
-            self._lights.write(light_records(lights, emitters, plan.camera.position, shadows))
-            lighting.add(lights, gbuffer, radiance, shadows)
+            self._lights.write(light_records(lights, emitters, plan.camera.position, shadows, plan.profiles))
+            lighting.add(lights, gbuffer, radiance, shadows, profiles)
 
     def _data_planes(self, draws: DrawList, plan: Plan) -> Planes:
         """Planes for the data layers: the beauty's own where it drew them in float at the pixels' centres.
@@ -121,5 +125,7 @@ class Pipeline:
 
     def _draw_gbuffer(self, draws: DrawList, plan: Plan, gbuffer: GBuffer, sample: Sample) -> None:
         self._view.write(view_record(plan, gbuffer.layout, sample))
-        variant = GBufferVariant(gbuffer.planes, gbuffer.layout, plan.cutout, draws.color_varies, draws.texture_groups)
+        variant = GBufferVariant(
+            gbuffer.planes, gbuffer.layout, plan.cutout, draws.color_varies, draws.texture_groups, plan.render_space
+        )
         self._gbuffer_pass(variant).draw(draws, gbuffer)

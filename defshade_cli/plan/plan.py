@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from defshade_cli.gpu.planes import MOST_TARGETS, Plane, named_planes, needed_planes
 from defshade_cli.image.layers import LAYERS, resolve
+from defshade_cli.image.render_space import RenderSpace, find_render_space
 from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
 from defshade_cli.scene.camera import Camera, image_size
+from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.window import DataWindow, from_ndc
@@ -30,6 +32,7 @@ class Plan:
     display, display_camera: the whole image, and the camera conformed to it.
     window: the part of it that is rendered; size and camera are its own.
     clip: (near, far), the camera's range tightened to the geometry.
+    render_space: of light and reflectance.
     exposure: linear, the camera's and the settings' together.
     filter_width: pixels.
     planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
@@ -45,6 +48,7 @@ class Plan:
     window: DataWindow
     camera: Camera
     clip: tuple[float, float]
+    render_space: RenderSpace
     exposure: float
     layout: Layout
     shading: Shading
@@ -92,6 +96,12 @@ class Plan:
         return tuple(planned.light for planned in self.lights if isinstance(planned.light, DomeLight))
 
     @property
+    def profiles(self) -> tuple[IesProfile, ...]:
+        """The IES profiles of the lights, each once."""
+        shapings = [planned.light.shaping for planned in self.lights]
+        return tuple(dict.fromkeys(shaping.ies for shaping in shapings if shaping and shaping.ies))
+
+    @property
     def volumes(self) -> tuple[Volume, ...]:
         """The kinds of volume that some light has, in the order of the lights."""
         return tuple(dict.fromkeys(planned.volume for planned in self.lights))
@@ -111,7 +121,7 @@ class Plan:
 
 
 def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
-    """Decide. Raises UsageError for a layer that does not exist or an image without pixels."""
+    """Decide. Raises UsageError for a layer or a render space that does not exist, or an image without pixels."""
     layers = resolve(settings.layers)
     display = image_size(scene.camera.aspect, settings.size, settings.width, scene.resolution)
     display_camera = scene.camera.conformed(display[0] * scene.pixel_aspect / display[1], scene.conform)
@@ -128,6 +138,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         window=window,
         camera=camera,
         clip=_tight_clip(camera, scene.bounds),
+        render_space=find_render_space(settings.render_space or scene.rendering_space, settings.ocio),
         exposure=exposure,
         layout=settings.layout,
         shading=settings.shading,

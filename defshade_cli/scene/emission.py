@@ -32,6 +32,7 @@ from defshade_cli.scene.light import (
     RectLight,
     SphereLight,
 )
+from defshade_cli.scene.radiance_map import RadianceMap
 from defshade_cli.spaces import is_similarity, normalize, transform_points
 
 Vector = NDArray[np.float64]
@@ -64,11 +65,15 @@ class Emitter:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Patch:
-    """A point of a light's surface in light space, its unit normal, and the area that it stands for."""
+    """A point of a light's surface in light space, its unit normal, and the area that it stands for.
+
+    weight: (3,) on the light's mean radiance; its mean over points is 1.
+    """
 
     point: Vector
     normal: Vector
     area: float
+    weight: Vector | float = 1.0
 
 
 def far_field(light: Light) -> Emitter:
@@ -94,7 +99,7 @@ def emitter_at(light: Light, u: Place, towards: Vector, *, inside: bool = True) 
         return far_field(light)
     cofactor = _cofactors(light.world_from_light[:3, :3]) @ patch.normal
     stretch = float(np.linalg.norm(cofactor))
-    intensity = light.radiance * (patch.area * stretch)
+    intensity = light.radiance * patch.weight * (patch.area * stretch)
     position = transform_points(light.world_from_light, patch.point)
     return Emitter(position, light.axis, normalize(cofactor), "cosine", intensity, patch.area * stretch)
 
@@ -137,8 +142,11 @@ def _patch(light: Light, u: Place, towards: Vector) -> _Patch | None:
             return _Patch(r * normal, normal, 4.0 * math.pi * r * r)
         case DiskLight(radius=r):
             return _Patch(np.array([*_circle(u[1], r * math.sqrt(u[0])), 0.0]), _FORWARD, math.pi * r * r)
-        case RectLight(width=w, height=h):
+        case RectLight(width=w, height=h, radiance_map=None):
             return _Patch(np.array([(u[0] - 0.5) * w, (u[1] - 0.5) * h, 0.0]), _FORWARD, w * h)
+        case RectLight(width=w, height=h, radiance_map=RadianceMap() as shown):
+            (s, t), weight = shown.sample(u[:2])  # its top left is at (+X, +Y)
+            return _Patch(np.array([(0.5 - s) * w, (0.5 - t) * h, 0.0]), _FORWARD, w * h, weight)
         case CylinderLight(radius=r, length=length):
             turn, density = _cardioid(u[1])
             normal = np.array([0.0, *_circle(turn + _turn_towards(light, towards), 1.0)])

@@ -33,6 +33,7 @@ class Scene:
     frame: time code, None for the default time.
     resolution, pixel_aspect, conform, data_window: of the stage's UsdRenderSettings, where it names one; the window
         is (xmin, ymin, xmax, ymax), 0..1 over the image, y up.
+    rendering_space: the colour space that they name; None for linear Rec.709, in which a Scene's colours are.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Scene:
     pixel_aspect: float = 1.0
     conform: ConformPolicy = "expandAperture"
     data_window: tuple[float, float, float, float] = WHOLE_IMAGE
+    rendering_space: str | None = None
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:

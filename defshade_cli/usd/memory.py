@@ -11,16 +11,19 @@ from defshade_cli.usd.binding import Bindings, read_bindings
 from defshade_cli.usd.geometry import Surface, is_time_varying, read_surface
 from defshade_cli.usd.kind import Kinds
 from defshade_cli.usd.material import ReadMaterial, read_material
+from defshade_cli.usd.skel import Rigs
 
 
 class Memory:
     """The unchanging parts of one stage, and the names of what stands in its prototypes.
 
-    kinds: of prims.  xforms: USD's cache, which drops only what varies when its time is set.
+    kinds: of prims.  rigs: what skeletons deform.
+    xforms: USD's cache, which drops only what varies when its time is set.
     """
 
     def __init__(self, stage: Usd.Stage, extras: Extras = NO_EXTRAS) -> None:
         self.kinds = Kinds()
+        self.rigs = Rigs()
         self.xforms = UsdGeom.XformCache()
         self._stage, self._extras = stage, extras
         self._surfaces: dict[Sdf.Path, tuple[Usd.TimeCode, Surface | None]] = {}

@@ -113,6 +113,7 @@ class StageReader:
             pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
             data_window=self._settings.data_window,
+            rendering_space=self._settings.rendering_space,
         )
 
     def _read_camera(

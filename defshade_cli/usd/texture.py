@@ -88,10 +88,10 @@ def _tiles(asset: Sdf.AssetPath, attribute: Usd.Attribute) -> tuple[tuple[int, I
     path = asset.path.replace("\\", "/")
     if UsdShade.UdimUtils.IsUdimIdentifier(path):
         found = UsdShade.UdimUtils.ResolveUdimTilePaths(path, layer)
-        tiles = tuple((int(number), _image_file(file)) for file, number in found)
+        tiles = tuple((int(number), image_file(file)) for file, number in found)
     else:
         resolved = asset.resolvedPath or _resolved(layer, path)
-        tiles = ((FIRST_UDIM, _image_file(resolved)),) if resolved else ()
+        tiles = ((FIRST_UDIM, image_file(resolved)),) if resolved else ()
     if not tiles:
         raise Unreadable(f"no file {asset.path}")
     return tiles
@@ -101,7 +101,8 @@ def _resolved(layer: Sdf.Layer, path: str) -> str:
     return str(Ar.GetResolver().Resolve(Sdf.ComputeAssetPathRelativeToLayer(layer, path)))
 
 
-def _image_file(resolved: str) -> ImageFile:
+def image_file(resolved: str) -> ImageFile:
+    """The file that Ar resolved. Raises Unreadable for one that is missing in its package."""
     if not Ar.IsPackageRelativePath(resolved):
         return ImageFile(resolved)
     inside = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(resolved))

@@ -72,6 +72,11 @@ struct Light {
     uint shadow_count;         // 0: casts none
     uint is_sky;               // one of the few directions that stand for a dome
     float extent;              // area that the point stands for; a distant light's solid angle; 0 for a point
+    vec3 right;                // unit, the light's X and Y: what an IES profile's horizontal angle is measured from
+    float ies_scale;           // of its candela
+    vec3 up;
+    uint ies_table;            // its layer; NO_IES for none
+    vec2 ies_vertical;         // the profile is read at x * angle + y radians
 };
 
 struct ShadowMap {

@@ -92,6 +92,19 @@ def _shading_options() -> list[Function]:
             "medium, high and veryhigh one, two and three levels.",
         ),
         option(
+            "--render-space",
+            metavar="NAME",
+            help="Scene-linear colour space that light and reflectance meet in, and that EXR holds: lin_rec709, ACEScg "
+            "or another of the OCIO config's. The default is the stage's render settings, then lin_rec709.",
+        ),
+        option(
+            "--ocio",
+            metavar="CONFIG",
+            default=_RENDER.ocio,
+            default_text="$OCIO, else ocio://default",
+            help="OCIO config: a file, or ocio://NAME for one that OpenColorIO has built in.",
+        ),
+        option(
             "--exposure",
             type=Finite(),
             metavar="STOPS",
