@@ -14,6 +14,9 @@ in vec4 display_color;
 flat in uint material_index;
 flat in uint instance_index;
 flat in float handedness;
+#ifdef PLANE_LINKS
+flat in uint link_set;
+#endif
 #ifdef POSITION
 in vec3 position_relative;
 #endif
@@ -27,6 +30,9 @@ in vec2 layer_uv;
 Surface surface_of(Material material, vec3 normal) {
     Surface s;
     s.normal = normal;
+#ifdef PLANE_LINKS
+    s.link_set = link_set;
+#endif
     s.base = render_from_rec709(material.diffuse_color);
     s.metallic = material.metallic;
     s.roughness = material.roughness;
@@ -60,15 +66,15 @@ Detail detail_of(vec3 normal) {
 
 void main() {
     Material material = material_at(material_index, display_color);
+    float side = gl_FrontFacing ? handedness : -handedness;
     vec3 normal = normalize(normal_relative);
     Detail detail = detail_of(normal);
 #ifdef TEXTURES
     apply_textures(material, normal, position_relative, uv);
 #endif
 #ifdef CUTOUT
-    if (is_cut_out(material, instance_index)) discard;
+    if (is_cut_out(material, instance_index) || (material.one_sided != 0u && side < 0.0)) discard;
 #endif
-    float side = gl_FrontFacing ? handedness : -handedness;
     detail.occlusion = material.occlusion;
     write_planes(surface_of(material, side * normal), detail);
 }

@@ -21,6 +21,9 @@ out vec4 display_color;
 flat out uint material_index;
 flat out uint instance_index;
 flat out float handedness;
+#ifdef PLANE_LINKS
+flat out uint link_set;
+#endif
 #ifdef POSITION
 out vec3 position_relative;
 #endif
@@ -40,6 +43,9 @@ void main() {
     instance_index = draw.x;
     material_index = draw.y;
     handedness = instance.handedness;
+#ifdef PLANE_LINKS
+    link_set = instance.link_set;
+#endif
 #ifdef POSITION
     position_relative = position.xyz;
 #endif

@@ -129,6 +129,12 @@ PLANES: tuple[Plane, ...] = (
         ),
         lambda material: material.clearcoat > 0.0 or "clearcoat" in material.inputs,
     ),
+    Plane(
+        "links",  # whether it is needed is the lights' affair
+        1,
+        _encodings("vec4(float(s.link_set))", "s.link_set = uint(t.r);", narrow="f4"),
+        lambda _: False,
+    ),
     _detail("facet", 4, "vec4(d.facet, 0.0)", "POSITION"),
     _detail("tangent", 4, "vec4(d.tangent, 0.0)", "POSITION", "LAYER_UV"),
     _detail("uv", 2, "vec4(d.uv, 0.0, 0.0)", "LAYER_UV"),

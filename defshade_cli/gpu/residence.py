@@ -18,7 +18,7 @@ from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 
-VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS, TEXTURE_INPUTS, TILES = range(7)
+VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS, TEXTURE_INPUTS, TILES, LINKS = range(8)
 """Binding points of the storage buffers, as the shaders declare them."""
 
 _COMMAND = np.dtype([(name, "u4") for name in ("count", "instances", "first_index", "base_vertex", "base_instance")])
@@ -142,6 +142,7 @@ def instance_records(drawables: Sequence[Drawable], eye: NDArray[np.float64]) ->
     normal, handedness = _normal_matrices(matrices[:, :3, :3])
     records["relative_from_normal"][:, :3, :3] = normal.transpose(0, 2, 1)
     records["handedness"] = handedness
+    records["link_set"] = np.concatenate([d.link_sets for d in drawables])
     records["display_color"] = np.concatenate([d.display_color for d in drawables])
     records["display_opacity"] = np.concatenate([d.display_opacity for d in drawables])
     return records

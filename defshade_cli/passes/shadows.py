@@ -137,9 +137,12 @@ class ShadowAtlas:
 class ShadowPass:
     """Draws shadow maps into an atlas of CAPACITY tiles; what one call draws the next overwrites."""
 
-    def __init__(self, gpu: Gpu, *, cutout: bool, color_varies: bool, texture_groups: int = 0) -> None:
+    def __init__(
+        self, gpu: Gpu, *, cutout: bool, color_varies: bool, texture_groups: int = 0, linked: bool = False
+    ) -> None:
         defines = ["CUTOUT"] * cutout + ["DISPLAY_COLOR_VARIES"] * (cutout and color_varies)
         defines += ["TEXTURES"] * (cutout and texture_groups > 0)
+        defines += ["LINKS"] * linked
         generated = {"generated/textures.glsl": textures_source(texture_groups)}
         size = (TILES * RESOLUTION, TILES * RESOLUTION)
         self._context = gpu.context
@@ -149,8 +152,17 @@ class ShadowPass:
         self._maps = RecordBuffer(gpu, SHADOW_MAPS)
         self._commands = gpu.keep(gpu.context.buffer(reserve=256))
 
-    def draw(self, draws: DrawList, cameras: Sequence[tuple[Camera, ...]], jitter: tuple[float, float]) -> ShadowAtlas:
-        """The maps of each light's cameras, at most CAPACITY in all; a light may have none. `jitter` is in texels."""
+    def draw(
+        self,
+        draws: DrawList,
+        cameras: Sequence[tuple[Camera, ...]],
+        jitter: tuple[float, float],
+        casters: Sequence[int] = (),
+    ) -> ShadowAtlas:
+        """The maps of each light's cameras, at most CAPACITY in all; a light may have none.
+
+        jitter: in texels.  casters: of each light, the place of its casters' link bits; all cast where none are given.
+        """
         count = np.array([len(c) for c in cameras], np.uint32)
         first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.uint32)
         maps = [camera for light in cameras for camera in light]
@@ -162,10 +174,10 @@ class ShadowPass:
             records = np.zeros(len(maps), record("ShadowMap"))
             for tile, camera in enumerate(maps):
                 records[tile] = _map_record(camera, tile, jitter)
-            self._draw_maps(draws, records)
+            self._draw_maps(draws, records, np.repeat(casters, count) if len(casters) else np.array([]))
         return ShadowAtlas(self._depth, first, count)
 
-    def _draw_maps(self, draws: DrawList, records: NDArray) -> None:
+    def _draw_maps(self, draws: DrawList, records: NDArray, casters: NDArray) -> None:
         """Each map with the commands that it may see."""
         commands = [draws.table[_may_see(m, draws.corners)] for m in records["clip_from_relative"]]
         self._write_commands(np.concatenate(commands))
@@ -178,6 +190,8 @@ class ShadowPass:
             x, y = tile % TILES, tile // TILES
             self._framebuffer.viewport = (x * RESOLUTION, y * RESOLUTION, RESOLUTION, RESOLUTION)
             self._program["clip_from_relative"] = tuple(row["clip_from_relative"].ravel().tolist())
+            if "first_caster" in self._program:
+                self._program["first_caster"] = int(casters[tile])
             if len(seen):
                 array.render_indirect(self._commands, count=len(seen), first=first)
             first += len(seen)

@@ -37,7 +37,8 @@ class Plan:
     filter_width: pixels.
     planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
     lights: sorted quads, spheres, cones.
-    shadows: some light casts them.  background: domes are seen where no geometry is.
+    shadows: some light casts them.  shadow_linked: in some light not all geometry does.
+    background: domes are seen where no geometry is.
     cutout: some opacity may be below 1.  textures: some material reads them.
     data_pass: data layers need an unjittered float GBuffer of their own.
     levels: how often subdivision surfaces were refined, ascending; empty without any.
@@ -60,6 +61,7 @@ class Plan:
     data_planes: tuple[Plane, ...]
     lights: tuple[PlannedLight, ...]
     shadows: bool
+    shadow_linked: bool
     background: bool
     cutout: bool
     textures: bool
@@ -150,6 +152,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         data_planes=data_planes,
         lights=lights,
         shadows=shadows,
+        shadow_linked=shadows and scene.shadow_linked,
         background=settings.background,
         cutout=cutout,
         textures=bool(scene.textures),
@@ -175,13 +178,18 @@ def _divide_planes(
     are too many.
     """
     rows = [LAYERS[name] for name in layers]
-    lit = needed_planes(scene.materials) if any(row.source == "lighting" for row in rows) else ()
+    lit = _lit_planes(scene) if any(row.source == "lighting" for row in rows) else ()
     data = named_planes(row.source for row in rows)
     both = named_planes(plane.name for plane in (*lit, *data))
     sampled, has_data = any(row.is_sampled for row in rows), not all(row.is_sampled for row in rows)
     exact = settings.layout == "float" and settings.samples == 1 and not cutout and len(both) <= MOST_TARGETS
     data_pass = has_data and not (sampled and exact)
     return (lit if data_pass or not has_data else both), data, data_pass
+
+
+def _lit_planes(scene: Scene) -> tuple[Plane, ...]:
+    names = [plane.name for plane in needed_planes(scene.materials)]
+    return named_planes([*names, *["links"] * scene.light_linked])
 
 
 def _has_cutout(scene: Scene) -> bool:

@@ -65,6 +65,16 @@ class Scene:
         boxes = [world_boxes(self.meshes[d.mesh].bounds, d.world_from_object) for d in self.drawables]
         return np.array([enclose([box]) for box in boxes]).reshape(-1, 2, 3)
 
+    @property
+    def light_linked(self) -> bool:
+        """Does some light leave geometry unlit?"""
+        return any(light.links and not light.links.lights.all() for light in self.lights)
+
+    @property
+    def shadow_linked(self) -> bool:
+        """Is there geometry that casts no shadow in some light?"""
+        return any(light.links and not light.links.casts.all() for light in self.lights)
+
     @cached_property
     def textures(self) -> tuple[Texture, ...]:
         """All that the materials read, each once."""

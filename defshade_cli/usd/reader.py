@@ -23,6 +23,7 @@ from defshade_cli.usd.complexity import View, choose_levels
 from defshade_cli.usd.geometry import Gprim, Surface
 from defshade_cli.usd.instancing import Piece
 from defshade_cli.usd.light import camera_light
+from defshade_cli.usd.linking import link
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.palette import Palette
 from defshade_cli.usd.settings import read_settings
@@ -94,14 +95,14 @@ class StageReader:
         gprims = self._tessellate(drawn, camera)
         palette = Palette(self._memory, time)
         meshes: dict[Mesh, int] = {}
-        drawables = tuple(_drawables(drawn, gprims, meshes, palette))
+        lights, drawables = link(self._stage, list(_lights(pieces)), list(_drawables(drawn, gprims, meshes, palette)))
         mended = dict.fromkeys(issue for gprim in gprims.values() for issue in gprim.issues)
         return Scene(
             name=facts.stage_name(self._stage),
             meshes=tuple(meshes),
             drawables=drawables,
             materials=palette.materials,
-            lights=tuple(_lights(pieces)),
+            lights=lights,
             camera=camera,
             cameras=self._cameras,
             unsupported=(*self._issues, *traversal.issues, *mended, *palette.issues, *camera_issues),
