@@ -22,7 +22,7 @@ from defshade_cli.passes.view import clip_from_camera
 from defshade_cli.scene.camera import Camera, Projection
 from defshade_cli.scene.emission import Emitter
 from defshade_cli.scene.light import Shaping
-from defshade_cli.spaces import Matrix, Window, normalize, transform_points
+from defshade_cli.spaces import Matrix, Window, frame_along, transform_points
 
 RESOLUTION = 1024
 TILES = 4
@@ -32,6 +32,10 @@ CAPACITY = TILES * TILES
 _WIDEST_DEGREES = 60.0
 _NO_WINDOW: Window = (-1.0, 1.0, -1.0, 1.0)
 _NEAREST = 1e-4  # near plane over far plane, where nothing else bounds it
+_DEPTH_OFFSET = (-2.0, -1.0)
+"""Of what a map stores, in slopes a texel and in steps of depth: at the four texels around a receiver a flat surface is
+up to |∂z/∂x| + |∂z/∂y| nearer. An offset along the light moves no shadow's edge, as one of the receiver would."""
+
 _ROUNDING = 1e-5  # what float32 may move a corner, over the greatest coordinate
 _FACES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], np.float64)
 
@@ -115,10 +119,8 @@ def _looking(
     clip: tuple[float, float],
     projection: Projection = "perspective",
 ) -> Camera:
-    back = -normalize(np.asarray(direction, np.float64))
-    right = normalize(np.cross(_FACES[2] if abs(back[1]) < 0.9 else _FACES[4], back))
     frame: Matrix = np.eye(4)
-    frame[:3, :3] = np.column_stack([right, np.cross(back, right), back])
+    frame[:3, :3] = frame_along(-np.asarray(direction))
     frame[:3, 3] = position
     return Camera("<shadow>", frame, window, projection, clip)
 
@@ -181,6 +183,7 @@ class ShadowPass:
         self._write_commands(np.concatenate(commands))
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = ">"
+        self._context.polygon_offset = _DEPTH_OFFSET
         array = self._context.vertex_array(self._program, draws.vertices_of(self._program), draws.indices)
         first = 0
         for tile, (row, seen) in enumerate(zip(records, commands, strict=True)):
@@ -193,6 +196,7 @@ class ShadowPass:
                 array.render_indirect(self._commands, count=len(seen), first=first)
             first += len(seen)
         array.release()
+        self._context.polygon_offset = 0.0, 0.0
         self._maps.write(records)
 
     def _write_commands(self, commands: NDArray) -> None:

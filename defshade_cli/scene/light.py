@@ -193,6 +193,11 @@ class SphereLight(Light):
     kind = "sphere"
 
     @property
+    def world_radius(self) -> float:
+        """The greatest, where the transform makes an ellipsoid of the sphere."""
+        return self.radius * float(np.linalg.norm(self.world_from_light[:3, :3], ord=2))
+
+    @property
     def size_factor(self) -> float:
         """Area of the ellipsoid that the transform makes: 4π R_G(a²b², a²c², b²c²) (DLMF 19.33.1)."""
         a, b, c = (self.radius * np.linalg.svd(self.world_from_light[:3, :3], compute_uv=False)) ** 2
