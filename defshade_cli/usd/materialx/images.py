@@ -12,7 +12,7 @@ from defshade_cli.usd.materialx.coordinates import Coordinates, gltf_placed, rea
 from defshade_cli.usd.materialx.graph import Graph
 from defshade_cli.usd.materialx.signal import Lookup, Signal, constant, texel
 from defshade_cli.usd.network import computed
-from defshade_cli.usd.texture import Unreadable, find_tiles
+from defshade_cli.usd.texture import Unreadable, image_tiles
 
 _WRAPS: dict[str, Wrap] = {
     "constant": "black",
@@ -85,7 +85,7 @@ def _read(
     try:
         if not isinstance(asset, Sdf.AssetPath) or not asset.path:
             raise Unreadable("image without file")
-        tiles = find_tiles(asset, attribute)
+        tiles = image_tiles(asset, attribute)
     except Unreadable as reason:
         graph.lost.append(str(reason))
         return graph.signal(node, names.default, default).widened(width)
