@@ -17,6 +17,7 @@ from defshade_cli.passes.emitters import LitSample, light_batches
 from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
+from defshade_cli.passes.identification import Manifests, Mattes, id_manifests
 from defshade_cli.passes.lighting import LightingPass, LightingVariant, light_records
 from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
@@ -52,14 +53,17 @@ class Pipeline:
     def render(self, scene: Scene, plan: Plan) -> Film:
         """The plan's layers. Raises GpuError."""
         self._gpu.make_current()
-        draws = self._scene.update(scene, layer_uv=plan.reads("LAYER_UV"))
+        draws = self._scene.update(scene, plan.inputs)
         layers: dict[str, NDArray[np.float32]] = {}
+        manifests: Manifests = {}
         if plan.sampled:
-            layers |= self._sampled_layers(draws, scene, plan)
+            layers, manifests = self._sampled_layers(draws, scene, plan)
         if plan.data_layers:
-            layers |= data_layers(self._data_planes(draws, plan), plan)
+            data = data_layers(self._data_planes(draws, plan), plan, scene)
+            layers, manifests = layers | data, manifests | id_manifests(data, scene)
         return Film(
             layers={name: layers[name] for name in plan.layers},
+            manifests=manifests,
             camera=plan.display_camera,
             origin=plan.window.origin,
             display=plan.display,
@@ -75,8 +79,11 @@ class Pipeline:
         self._gpu.make_current()
         return self._drawn_planes(self._scene.update(scene), plan.planes, plan)
 
-    def _sampled_layers(self, draws: DrawList, scene: Scene, plan: Plan) -> dict[str, NDArray[np.float32]]:
-        """What is a mean of samples."""
+    def _sampled_layers(
+        self, draws: DrawList, scene: Scene, plan: Plan
+    ) -> tuple[dict[str, NDArray[np.float32]], Manifests]:
+        """What is a mean of samples, and what ids in it stand for."""
+        mattes = Mattes(scene, plan)
         gbuffer = self._frame.gbuffer(plan.size, plan.planes, plan.layout)
         radiance = self._frame.radiance("sample", plan.size, gbuffer)
         total = self._frame.radiance("total", plan.size) if plan.samples > 1 else radiance
@@ -84,11 +91,13 @@ class Pipeline:
         tables = self._tables.update(plan)
         for sample in samples(plan.samples, plan.filter, plan.filter_width):
             self._draw_gbuffer(draws, plan, gbuffer, sample)
+            if plan.mattes:
+                mattes.add(gbuffer.target.read("visible"))
             self._light(draws, scene, plan, sample, tables, gbuffer, radiance)
             if plan.samples > 1:
                 self._accumulation.add(radiance, total)
         beauty = np.divide(total.read("radiance"), plan.samples, dtype=np.float32)
-        return {"beauty": beauty, "alpha": beauty[..., 3:]}
+        return {"beauty": beauty, "alpha": beauty[..., 3:]} | mattes.layers(), mattes.manifests()
 
     def _light(
         self,
