@@ -84,7 +84,10 @@ class RenderSettings:
     crop: (x, y, width, height) of the pixels that are rendered, from the image's top left corner, which they may leave;
         None follows the stage's RenderSettings, then the whole image.
     samples: jittered samples a pixel; 1 is a sample at the pixel's centre.
+    cryptomatte_levels: ids a pixel of a Cryptomatte holds, the greatest coverage first; even.
     filter: the samples of a pixel fall by it.  filter_width: pixels from end to end; None for the filter's own.
+    render_space: the scene-linear colour space of the image, by a name that the OCIO config knows; None follows the
+        stage's RenderSettings, then linear Rec.709.  ocio: the config, a file or ocio://NAME; empty for $OCIO's.
     exposure: stops added to the camera's own.
     shadows: False lights every surface that faces a light.
     complexity: how finely subdivision surfaces are refined: by their size in the image, or 0 to 3 levels all alike.
@@ -98,9 +101,12 @@ class RenderSettings:
     samples: int = 1
     filter: Filter = "box"
     filter_width: float | None = None
+    cryptomatte_levels: int = 6
     layout: Layout = "float"
     shading: Shading = "preview-surface"
     layers: tuple[str, ...] = ("beauty",)
+    render_space: str | None = None
+    ocio: str = ""
     exposure: float = 0.0
     purposes: tuple[str, ...] = ("default", "render")
     light_tolerance: float = 1e-5
@@ -114,7 +120,7 @@ class OutputSettings:
     """How a film becomes files.
 
     patterns: file names with frame and name tokens; the suffix picks the format. One file per pattern and frame.
-    display, view: of the OCIO config, for display-referred formats; None takes the config's default.
+    display, view, look: of the OCIO config, for display-referred formats; None takes the config's default, and no look.
     full_float: 32-bit channels in EXR in place of half (data layers are always 32-bit).
     multipart: a part of the EXR for each layer.  tiled: EXR in tiles; mipmaps: in tiles with all smaller levels.
     bits: a channel of a picture; None takes the format's default.  dither: 8-bit colours, against banding.
@@ -125,6 +131,7 @@ class OutputSettings:
     existing: Existing = "overwrite"
     display: str | None = None
     view: str | None = None
+    look: str | None = None
     full_float: bool = False
     compression: Compression = "zip"
     split_layers: bool = False

@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.planes import Plane, uses_standard_depth, write_source
+from defshade_cli.gpu.planes import Plane, integer_attachments, uses_standard_depth, write_source
+from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.residence import DrawList
 from defshade_cli.gpu.targets import Target, allocate
 from defshade_cli.gpu.textures import textures_source
+from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.settings import Layout
 
 _CLIP_DISTANCE = 0x3000
@@ -58,6 +60,7 @@ class GBufferVariant:
     cutout: bool
     color_varies: bool
     texture_groups: int = 0
+    space: RenderSpace = REC709
     clipping_planes: int = 0
 
     @property
@@ -66,7 +69,7 @@ class GBufferVariant:
         flags += ["TEXTURES", "POSITION"] * bool(self.texture_groups)
         flags += [f"CLIPPING_PLANES {self.clipping_planes}"] * bool(self.clipping_planes)
         inputs = [name for plane in self.planes for name in plane.inputs]
-        return list(dict.fromkeys([plane.define for plane in self.planes] + flags + inputs))
+        return list(dict.fromkeys([plane.define for plane in self.planes] + flags + inputs)) + space_defines(self.space)
 
 
 class GBufferPass:
@@ -77,7 +80,7 @@ class GBufferPass:
             "generated/planes.glsl": write_source(variant.planes, variant.layout),
             "generated/textures.glsl": textures_source(variant.texture_groups),
         }
-        self._context = gpu.context
+        self._gpu, self._context = gpu, gpu.context
         self._program = gpu.shaders.program(
             "gbuffer.vert", "gbuffer.frag", defines=variant.defines, generated=generated
         )
@@ -91,6 +94,8 @@ class GBufferPass:
         framebuffer = gbuffer.target.framebuffer
         framebuffer.use()
         framebuffer.clear(depth=1.0 if standard else 0.0)
+        for attachment in integer_attachments(gbuffer.planes, gbuffer.layout):
+            self._gpu.clear_integers(attachment)
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = "<" if standard else ">"
         draws.textures.bind(self._program)

@@ -1,8 +1,8 @@
 """The solids of revolution as Hydra draws them: Catmull-Clark cages of ten segments, refined as often as meshes are.
 
 A tessellation finer than that is not what usdrecord shows at any complexity: refined, the cages shrink to within the
-solids that they stand for, a sphere by 6 % of its radius. Hydra: GeomUtil's mesh generators, HdsiImplicitSurface-
-SceneIndex.
+solids that they stand for, a sphere by 8 % of its radius at the equator. Hydra: GeomUtil's mesh generators and
+HdsiImplicitSurfaceSceneIndex.
 """
 
 from __future__ import annotations

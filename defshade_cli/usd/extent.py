@@ -20,16 +20,18 @@ def stage_extent(stage: Usd.Stage, purposes: Sequence[str]) -> NDArray[np.float6
 
 
 def extent_of(stage: Usd.Stage, surface: Surface, time: Usd.TimeCode) -> NDArray[np.float64]:
-    """(2, 3) least and greatest corner in object space: the authored extent, else USD's computation.
+    """(2, 3) least and greatest corner in object space, where they are not the drawn polygons' own.
 
-    The polygons' own where USD gives neither, and of each of a surface's copies.
+    A cage is smaller than its solid, and what has no faces has no corners at all: for these USD is asked, which takes
+    the authored extent, else computes one.
     """
     prim = stage.GetPrimAtPath(surface.path)
-    if surface.copies is not None or not prim:
+    is_solid = surface.control is not None and not prim.IsA(UsdGeom.Mesh)
+    if surface.copies is not None or not prim.IsA(UsdGeom.Gprim) or (surface.groups and not is_solid):
         return surface.polygons.bounds
-    attribute = UsdGeom.Boundable(prim).GetExtentAttr()
-    authored = attribute.Get(time) if attribute.HasAuthoredValue() else None
-    value = authored or UsdGeom.Boundable.ComputeExtentFromPlugins(UsdGeom.Boundable(prim), time)
+    gprim = UsdGeom.Boundable(prim)
+    authored = gprim.GetExtentAttr().Get(time) if gprim.GetExtentAttr().HasAuthoredValue() else None
+    value = authored or UsdGeom.Boundable.ComputeExtentFromPlugins(gprim, time)
     box = None if value is None else floats(value, 3)
     if box is None or box.shape != (2, 3) or not np.isfinite(box).all() or (box[0] > box[1]).any():
         return surface.polygons.bounds

@@ -29,6 +29,7 @@ class StageSettings:
     camera: prim path.
     pixel_aspect: width over height of a pixel; None lets the image cover the camera's aperture exactly.
     data_window: (xmin, ymin, xmax, ymax), 0..1 over the image, y up.
+    rendering_space: colour space that the image is rendered in.
     instantaneous: the shutter closes when it opens.
     """
 
@@ -37,6 +38,7 @@ class StageSettings:
     pixel_aspect: float | None = 1.0
     conform: ConformPolicy = "expandAperture"
     data_window: tuple[float, float, float, float] = WHOLE_IMAGE
+    rendering_space: str | None = None
     motion_blur: bool = True
     instantaneous: bool = False
     depth_of_field: bool = True
@@ -72,6 +74,7 @@ def read_settings(stage: Usd.Stage) -> StageSettings:
         pixel_aspect=None if stretch else max(float(_value(prims, "pixelAspectRatio")), 0.0) or 1.0,
         conform=next((known for known in _POLICIES if known == policy), "expandAperture"),
         data_window=tuple(_value(prims, "dataWindowNDC")),
+        rendering_space=settings.GetRenderingColorSpaceAttr().Get() or None,
         motion_blur=not _value(prims, "disableMotionBlur"),
         instantaneous=bool(_value(prims, "instantaneousShutter")),
         depth_of_field=not _value(prims, "disableDepthOfField"),

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 
-from defshade_cli.image.colour import RENDER_SPACE, Pixels
+from defshade_cli.image.colour import Pixels
 from defshade_cli.image.encoders.sink import bounded, make_spec, opened, set_attributes
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import BEAUTY, LAYERS, MAIN_PART
@@ -72,20 +72,20 @@ def _part(film: Film, names: tuple[str, ...], output: OutputSettings) -> _Part:
 
 
 def _spec(film: Film, names: tuple[str, ...], halves: set[str], compression: Compression) -> oiio.ImageSpec:
-    channels = [channel for name in names for channel in LAYERS[name].channel_names]
-    types = ["half" if name in halves else "float" for name in names for _ in LAYERS[name].channels]
+    channels = [channel for name in names for channel in film.row(name).channel_names]
+    types = ["half" if name in halves else "float" for name in names for _ in film.row(name).channels]
     spec = make_spec(film, len(channels), types[0])
     spec.channelnames = channels
     if len(set(types)) > 1:
         spec.channelformats = tuple(oiio.TypeDesc(kind) for kind in types)
-    spec.set_colorspace(RENDER_SPACE if any(LAYERS[name].is_color for name in names) else "data")
+    spec.set_colorspace(film.render_space.interop_id if any(LAYERS[name].is_color for name in names) else "data")
     spec.attribute("compression", _lossless_for_data(compression, names))
     set_attributes(spec, exr_attributes(film, names))
     return spec
 
 
 def _lossless_for_data(compression: Compression, names: tuple[str, ...]) -> Compression:
-    data = [name for name in names if not LAYERS[name].is_color and _DWA_LOSSY & set(LAYERS[name].channels)]
+    data = [name for name in names if not LAYERS[name].is_color and _DWA_LOSSY & LAYERS[name].suffixes]
     if compression != "dwaa" or not data:
         return compression
     log.warning("dwaa would blur the data in %s: this file is compressed with zip", ", ".join(data))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -101,6 +102,8 @@ def _case(key: str, item: Path, name: str, reference: Mapping[str, Any]) -> Case
     command = reference.get("command", "")
     maker = _maker(reference, command)
     conditions = {"storm": _storm, "usdrecord": _usdrecord, "arnold": _arnold}.get(maker, _viewer)
+    if maker == "arnold":
+        command += _readme_options(item / name)
     return Case(key, item.name, stage, name, item / reference["image"], maker, conditions(reference, command))
 
 
@@ -183,6 +186,13 @@ def _arnold(reference: Mapping[str, Any], command: str) -> Conditions:
     width, height = options["r"][-1]
     frame = float(options["frame"][-1][0]) if "frame" in options else 1.0
     return Conditions(size=(int(width), int(height)), frame=frame, conform="adjustApertureHeight")
+
+
+def _readme_options(stage: Path) -> str:
+    """The frame that a test of Arnold's asks for in its README, where it has a script of its own."""
+    readme = stage.parents[1] / "README"
+    found = re.search(r"'script':'[^']*(-frame [0-9.]+)", readme.read_text("utf-8")) if readme.exists() else None
+    return f" {found[1]}" if found else ""
 
 
 def _viewer(reference: Mapping[str, Any], command: str) -> Conditions:

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from defshade_cli.errors import DefshadeError
+from defshade_cli.errors import DefshadeError, EmptyStage
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.snapshot import write_snapshot
 from defshade_cli.measure.conformance.catalogue import Case, read_item
@@ -30,6 +30,8 @@ def examine(case: Case, pipeline: Pipeline, out: Path) -> Result:
     with _gathered_warnings() as warnings:
         try:
             drawn = draw(case, pipeline)
+        except EmptyStage as error:
+            return result_of(case, remark=str(error), warnings=tuple(warnings))
         except DefshadeError as error:
             return result_of(case, error=str(error), warnings=tuple(warnings))
     pictures = {name: f"{case.key}.{name}{_SUFFIX}" for name in drawn.pictures}
