@@ -18,7 +18,7 @@ class Frame:
         self._gpu = gpu
         self._size: Size = (0, 0)
         self._gbuffers: dict[tuple[tuple[Plane, ...], Layout], GBuffer] = {}
-        self._radiance: dict[str, Target] = {}
+        self._radiance: dict[tuple[str, GBuffer | None], Target] = {}
 
     def gbuffer(self, size: Size, planes: tuple[Plane, ...], layout: Layout) -> GBuffer:
         """The GBuffer of (width, height) in a layout, as last drawn. Raises GpuError."""
@@ -30,7 +30,7 @@ class Frame:
     def radiance(self, name: str, size: Size, gbuffer: GBuffer | None = None) -> Target:
         """A float RGBA target with one texture "radiance"; it tests against the depth of `gbuffer` where given."""
         self._resize(size)
-        key = name if gbuffer is None else f"{name} {gbuffer.layout} {len(gbuffer.planes)}"
+        key = name, gbuffer
         if key not in self._radiance:
             depth = gbuffer.target.depth if gbuffer else None
             self._radiance[key] = allocate(self._gpu, size, {"radiance": (4, "f4")}, depth)

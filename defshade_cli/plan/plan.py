@@ -41,6 +41,7 @@ class Plan:
     background: domes are seen where no geometry is.
     cutout: some opacity may be below 1.  textures: some material reads them.
     data_pass: data layers need an unjittered float GBuffer of their own.
+    portals: how many hints for sampling domes the stage has.
     levels: how often subdivision surfaces were refined, ascending; empty without any.
     ranks: (id, coverage) pairs of a Cryptomatte.
     """
@@ -68,6 +69,7 @@ class Plan:
     textures: bool
     data_pass: bool
     complexity: Complexity
+    portals: int
     levels: tuple[int, ...]
     ranks: int
 
@@ -167,6 +169,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         data_pass=data_pass,
         complexity=settings.complexity,
         ranks=settings.cryptomatte_levels,
+        portals=len(scene.portals),
         levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None})),
     )
 
