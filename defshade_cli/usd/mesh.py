@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom, Vt
+from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.usd.normals import mend_normals
 from defshade_cli.usd.polygons import SCHEMES, Polygons, Primvar, Scheme
+from defshade_cli.usd.positions import read_positions
 from defshade_cli.usd.primvars import Authored, Elements, authored, count_elements, fit, read_display, read_uvs
-from defshade_cli.usd.values import floats, integers
+from defshade_cli.usd.values import integers
 
 MESH_ATTRIBUTES = ("points", "faceVertexCounts", "faceVertexIndices", "holeIndices", "normals")
 """What is read of a Mesh that may vary over time, besides primvars."""
 
+_POINTS = Sdf.ValueTypeNames.Point3fArray.type
 _NONE = np.empty(0, np.int32)
 
 
@@ -40,12 +42,10 @@ def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> Poly
 
 
 def _points(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> NDArray[np.float32]:
-    value = mesh.GetPointsAttr().Get(time)
-    points = floats(value, 3) if isinstance(value, Vt.Vec3fArray) else None
-    if value is not None and points is None:
-        issues.append(f"points are {mesh.GetPointsAttr().GetTypeName()}, which the schema does not allow")
+    points = read_positions(mesh.GetPrim(), time)
     if points is None or not len(points):
-        issues.append("it has no points")
+        type_name = mesh.GetPointsAttr().GetTypeName()
+        issues.append("it has no points" if type_name.type == _POINTS else f"its points are {type_name}, not point3f[]")
         return np.empty((0, 3), np.float32)
     return points
 
