@@ -17,7 +17,7 @@ from pxr import Usd, UsdGeom
 from defshade_cli.usd.basis import LARGEST_DETAIL, CurveSamples, Kind, sample_curves
 from defshade_cli.usd.points import read_widths
 from defshade_cli.usd.polygons import Polygons, Primvar
-from defshade_cli.usd.primvars import Authored, authored, fit, read_display, read_uvs
+from defshade_cli.usd.primvars import DISPLAY_COLOR, Authored, authored, fit, read_display, read_uvs
 from defshade_cli.usd.tubes import ribbons, tubes
 from defshade_cli.usd.values import floats, integers
 
@@ -31,7 +31,9 @@ _DETAILS = ((LARGEST_DETAIL, 12), (4, 6), (2, 3))
 """Samples a segment of cubic curves, and sides of tubes."""
 
 
-def read_curves(curves: UsdGeom.BasisCurves, time: Usd.TimeCode, issues: list[str]) -> Polygons:
+def read_curves(
+    curves: UsdGeom.BasisCurves, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR
+) -> Polygons:
     """All curves of the prim, each a face in the sense of `Polygons.faces`. Bad data becomes issues."""
     value = curves.GetPointsAttr().Get(time)
     points = None if value is None else floats(value, 3)
@@ -45,7 +47,7 @@ def read_curves(curves: UsdGeom.BasisCurves, time: Usd.TimeCode, issues: list[st
     samples, sides = _detailed(kind, counts, len(points))
     if samples.left_out:
         issues.append(f"{samples.left_out} curves are left out: they have too few points, or cannot be closed")
-    return _build(curves, samples, points, sides, time, issues)
+    return _build(curves, samples, points, sides, time, issues, color)
 
 
 def _complete(counts: NDArray[np.integer], available: int, issues: list[str]) -> NDArray[np.int64]:
@@ -80,6 +82,7 @@ def _build(
     sides: int,
     time: Usd.TimeCode,
     issues: list[str],
+    color: str,
 ) -> Polygons:
     prim = curves.GetPrim()
 
@@ -90,7 +93,7 @@ def _build(
     shape = tubes(samples, centres, radii, sides) if normals is None else ribbons(samples, centres, radii, normals)
     shape = replace(
         shape,
-        display_color=read_display(prim, "displayColor", 3, time, samples.elements, issues),
+        display_color=read_display(prim, color, 3, time, samples.elements, issues),
         display_opacity=read_display(prim, "displayOpacity", 1, time, samples.elements, issues),
         uvs=read_uvs(prim, time, samples.elements, issues),
     )

@@ -12,7 +12,9 @@ from defshade_cli.usd.binding import Bindings, read_bindings
 from defshade_cli.usd.geometry import Surface, is_time_varying, read_surface
 from defshade_cli.usd.kind import Kinds
 from defshade_cli.usd.material import ReadMaterial, read_material
+from defshade_cli.usd.primvars import DISPLAY_COLOR
 from defshade_cli.usd.skel import Rigs
+from defshade_cli.usd.subsets import material_subsets
 
 
 class Memory:
@@ -42,7 +44,7 @@ class Memory:
             time_read, surface = self._surfaces[path]
             if time == time_read or not self._is_time_varying(prim):
                 return surface
-        read = read_surface(prim, time)
+        read = read_surface(prim, time, self._color_primvar(prim, time))
         surface = None if read is None else self._as_shown(read, path)
         self._surfaces[path] = time, surface
         return surface
@@ -53,6 +55,13 @@ class Memory:
         if key not in self._stand_ins:
             self._stand_ins[key] = self._as_shown(self._models.read(prim, mode), prim.GetPath())
         return self._stand_ins[key]
+
+    def _color_primvar(self, prim: Usd.Prim, time: Usd.TimeCode) -> str:
+        """What stands for displayColor: the primvar that a material bound to the prim reads its colour from."""
+        paths = (prim.GetPath(), *(subset.GetPath() for subset in material_subsets(prim)))
+        bound = (material for path in paths for material in self.bindings(path).candidates)
+        read = (self.material(path, time).material.color_primvar for path in bound)
+        return next((name for name in read if name), DISPLAY_COLOR)
 
     def material(self, path: Sdf.Path, time: Usd.TimeCode) -> ReadMaterial:
         if path in self._materials:
@@ -85,7 +94,7 @@ class Memory:
         """Asked only when a second frame is read."""
         path = prim.GetPath()
         if path not in self._time_varying:
-            self._time_varying[path] = is_time_varying(prim)
+            self._time_varying[path] = is_time_varying(prim, self._color_primvar(prim, Usd.TimeCode.Default()))
         return self._time_varying[path]
 
     def _as_shown(self, surface: Surface, path: Sdf.Path) -> Surface:

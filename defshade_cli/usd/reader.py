@@ -14,7 +14,6 @@ from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
 from defshade_cli.scene.light import Light
-from defshade_cli.scene.material import UNBOUND
 from defshade_cli.scene.scene import Scene, Unsupported
 from defshade_cli.settings import Complexity
 from defshade_cli.usd import stage as facts
@@ -153,15 +152,16 @@ def _drawables(
         gprim = gprims[surface]
         if not gprim.groups:
             continue
-        subsets = (Subset(palette.number(piece.bindings[g.path]), g.first, g.count) for g in gprim.groups)
+        subsets = tuple(Subset(palette.number(piece.bindings[g.path]), g.first, g.count) for g in gprim.groups)
+        first = palette.materials[subsets[0].material]
         yield Drawable(
             mesh=meshes.setdefault(gprim.mesh, len(meshes)),
             world_from_object=piece.root_from_object,
-            subsets=tuple(subsets),
+            subsets=subsets,
             paths=piece.paths,
             instance_ids=piece.ids,
-            display_color=np.nan_to_num(piece.display_color, nan=UNBOUND.diffuse_color[0]),
-            display_opacity=np.nan_to_num(piece.display_opacity, nan=UNBOUND.opacity),
+            display_color=np.where(np.isnan(piece.display_color), first.diffuse_color, piece.display_color),
+            display_opacity=np.nan_to_num(piece.display_opacity, nan=first.opacity),
         )
 
 
