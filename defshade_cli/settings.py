@@ -84,6 +84,7 @@ class RenderSettings:
     crop: (x, y, width, height) of the pixels that are rendered, from the image's top left corner, which they may leave;
         None follows the stage's RenderSettings, then the whole image.
     samples: jittered samples a pixel; 1 is a sample at the pixel's centre.
+    cryptomatte_levels: ids a pixel of a Cryptomatte holds, the greatest coverage first; even.
     filter: the samples of a pixel fall by it.  filter_width: pixels from end to end; None for the filter's own.
     render_space: the scene-linear colour space of the image, by a name that the OCIO config knows; None follows the
         stage's RenderSettings, then linear Rec.709.  ocio: the config, a file or ocio://NAME; empty for $OCIO's.
@@ -100,6 +101,7 @@ class RenderSettings:
     samples: int = 1
     filter: Filter = "box"
     filter_width: float | None = None
+    cryptomatte_levels: int = 6
     layout: Layout = "float"
     shading: Shading = "preview-surface"
     layers: tuple[str, ...] = ("beauty",)

@@ -14,6 +14,9 @@ in vec4 display_color;
 flat in uint material_index;
 flat in uint instance_index;
 flat in float handedness;
+#ifdef PLANE_LINKS
+flat in uint link_set;
+#endif
 #ifdef POSITION
 in vec3 position_relative;
 #endif
@@ -23,10 +26,16 @@ in vec4 uv;
 #ifdef LAYER_UV
 in vec2 layer_uv;
 #endif
+#ifdef DRAW_ROW
+flat in uint visible_row;
+#endif
 
 Surface surface_of(Material material, vec3 normal) {
     Surface s;
     s.normal = normal;
+#ifdef PLANE_LINKS
+    s.link_set = link_set;
+#endif
     s.base = render_from_rec709(material.diffuse_color);
     s.metallic = material.metallic;
     s.roughness = material.roughness;
@@ -55,20 +64,23 @@ Detail detail_of(vec3 normal) {
     Coordinates c = Coordinates(layer_uv, dFdx(layer_uv), dFdy(layer_uv));
     d.tangent = tangent_across(normal, along_coordinates(dFdx(position_relative), dFdy(position_relative), c)[0]);
 #endif
+#ifdef PLANE_VISIBLE
+    d.visible = uvec2(visible_row + 1u, uint(gl_PrimitiveID));
+#endif
     return d;
 }
 
 void main() {
     Material material = material_at(material_index, display_color);
+    float side = gl_FrontFacing ? handedness : -handedness;
     vec3 normal = normalize(normal_relative);
     Detail detail = detail_of(normal);
 #ifdef TEXTURES
     apply_textures(material, normal, position_relative, uv);
 #endif
 #ifdef CUTOUT
-    if (is_cut_out(material, instance_index)) discard;
+    if (is_cut_out(material, instance_index) || (material.one_sided != 0u && side < 0.0)) discard;
 #endif
-    float side = gl_FrontFacing ? handedness : -handedness;
     detail.occlusion = material.occlusion;
     write_planes(surface_of(material, side * normal), detail);
 }

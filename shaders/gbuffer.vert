@@ -14,6 +14,10 @@ in vec4 vertex_uv;             // two sets
 in vec2 vertex_layer_uv;
 out vec2 layer_uv;
 #endif
+#ifdef DRAW_ROW
+in uint draw_row;
+flat out uint visible_row;
+#endif
 in uvec2 draw;                 // instance, material
 
 out vec3 normal_relative;
@@ -21,6 +25,9 @@ out vec4 display_color;
 flat out uint material_index;
 flat out uint instance_index;
 flat out float handedness;
+#ifdef PLANE_LINKS
+flat out uint link_set;
+#endif
 #ifdef POSITION
 out vec3 position_relative;
 #endif
@@ -40,6 +47,9 @@ void main() {
     instance_index = draw.x;
     material_index = draw.y;
     handedness = instance.handedness;
+#ifdef PLANE_LINKS
+    link_set = instance.link_set;
+#endif
 #ifdef POSITION
     position_relative = position.xyz;
 #endif
@@ -48,6 +58,9 @@ void main() {
 #endif
 #ifdef LAYER_UV
     layer_uv = vertex_layer_uv;
+#endif
+#ifdef DRAW_ROW
+    visible_row = draw_row;
 #endif
     gl_Position = view.clip_from_relative * vec4(position.xyz, 1.0);
 }

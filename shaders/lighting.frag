@@ -2,6 +2,9 @@
 #include "lib/surface.glsl"
 #include "lib/light.glsl"
 #include "lib/shadow.glsl"
+#ifdef PLANE_LINKS
+#include "lib/linking.glsl"
+#endif
 #include "lib/render_space.glsl"
 #include "generated/planes.glsl"
 
@@ -34,7 +37,10 @@ void main() {
     vec3 irradiance = irradiance_from(lights[light_index], position, l);
     if (irradiance == vec3(0.0)) discard;
     Surface surface = read_planes(pixel);
-    irradiance *= visibility(lights[light_index], position, surface.normal, l);
+#ifdef PLANE_LINKS
+    if (!is_linked(lights[light_index].first_link, surface.link_set)) discard;
+#endif
+    irradiance *= visibility(lights[light_index], position, l);
     float widening = patch_alpha_squared(lights[light_index], position, l);
     if (widening > 0.0) {
         surface.roughness = widened_roughness(surface.roughness, widening);

@@ -206,8 +206,6 @@ def test_a_mesh_light_is_reported_and_its_mesh_drawn() -> None:
 @pytest.mark.parametrize(
     ("body", "reason"),
     [
-        ("rel collection:lightLink:excludes = </cube>", "lightLink is ignored: everything is linked"),
-        ("uniform bool collection:shadowLink:includeRoot = 0", "shadowLink is ignored: everything is linked"),
         ("rel light:filters = </cube>", "light filters are ignored"),
         ("asset inputs:texture:file = @sky.png@", "the texture sky.png is ignored: there is no such file"),
         ("asset inputs:shaping:ies:file = @lamp.ies@", "the profile lamp.ies is ignored: there is no such file"),

@@ -18,6 +18,7 @@ from defshade_cli.gpu.targets import Target
 from defshade_cli.image.environment import sky_of
 from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.gbuffer import GBuffer
+from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.plan import Plan
 from defshade_cli.scene.environment import Environment
 from defshade_cli.scene.light import DomeLight
@@ -60,14 +61,14 @@ class EnvironmentPass:
         self._screen = gpu.keep(gpu.context.vertex_array(self._program, []))
         self._skies: dict[Environment, moderngl.Texture] = {}
 
-    def draw(self, dome: DomeLight, gbuffer: GBuffer, radiance: Target) -> None:
-        """Add the dome to `radiance`."""
+    def draw(self, dome: DomeLight, gbuffer: GBuffer, radiance: Target, first_link: int = ALL_LINKED) -> None:
+        """Add the dome to `radiance`. first_link: place of its bits, which are bound."""
         radiance.framebuffer.use()
         self._gpu.context.enable_only(moderngl.BLEND)
         self._gpu.context.blend_func = moderngl.ONE, moderngl.ONE
         sky = sky_of(dome)
         gbuffer.bind(self._program, sky=self._texture(sky))
-        for name, value in _uniforms(dome, sky).items():
+        for name, value in {**_uniforms(dome, sky), "first_link": first_link}.items():
             if name in self._program:
                 self._program[name] = value
         self._screen.render(vertices=3)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import moderngl
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.planes import Plane, uses_standard_depth, write_source
+from defshade_cli.gpu.planes import Plane, integer_attachments, uses_standard_depth, write_source
 from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.residence import DrawList
 from defshade_cli.gpu.targets import Target, allocate
@@ -70,7 +70,7 @@ class GBufferPass:
             "generated/planes.glsl": write_source(variant.planes, variant.layout),
             "generated/textures.glsl": textures_source(variant.texture_groups),
         }
-        self._context = gpu.context
+        self._gpu, self._context = gpu, gpu.context
         self._program = gpu.shaders.program(
             "gbuffer.vert", "gbuffer.frag", defines=variant.defines, generated=generated
         )
@@ -81,6 +81,8 @@ class GBufferPass:
         framebuffer = gbuffer.target.framebuffer
         framebuffer.use()
         framebuffer.clear(depth=1.0 if standard else 0.0)
+        for attachment in integer_attachments(gbuffer.planes, gbuffer.layout):
+            self._gpu.clear_integers(attachment)
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = "<" if standard else ">"
         draws.textures.bind(self._program)

@@ -22,7 +22,9 @@ from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.targets import Target
 from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.gbuffer import GBuffer
+from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.shadows import ShadowAtlas
+from defshade_cli.passes.tables import NO_TABLES, LightTables
 from defshade_cli.passes.volumes import cone_volume, sphere_volume
 from defshade_cli.plan import Plan, PlannedLight, Volume
 from defshade_cli.scene.emission import Emitter
@@ -98,7 +100,7 @@ class LightingPass:
         gbuffer: GBuffer,
         radiance: Target,
         shadows: ShadowAtlas | None = None,
-        profiles: moderngl.TextureArray | None = None,
+        tables: LightTables = NO_TABLES,
     ) -> None:
         """The volumes of `lights`, whose records are bound, on top of `radiance`."""
         radiance.framebuffer.use()
@@ -109,7 +111,7 @@ class LightingPass:
         kinds = [planned.volume for planned in lights]
         for volume in dict.fromkeys(kinds):
             maps = shadows.depth if shadows else None
-            gbuffer.bind(self._volumes[volume].program, shadow_atlas=maps, ies_tables=profiles)
+            gbuffer.bind(self._volumes[volume].program, shadow_atlas=maps, ies_tables=tables.candela)
             self._draw_volumes(volume, kinds.index(volume), kinds.count(volume))
         self._context.disable_direct(DEPTH_CLAMP)
 
@@ -134,9 +136,9 @@ def light_records(
     emitters: Sequence[Emitter],
     eye: NDArray[np.float64],
     shadows: ShadowAtlas | None,
-    profiles: Sequence[IesProfile] = (),
+    tables: LightTables = NO_TABLES,
 ) -> NDArray:
-    """One Light record each, positions relative to the eye; `profiles` are the layers of the IES tables."""
+    """One Light record each, positions relative to the eye."""
     records = np.zeros(len(lights), record("Light"))
     for row, planned, emitter in zip(records, lights, emitters, strict=True):
         row["position"], row["axis"], row["facing"] = emitter.position - eye, emitter.axis, emitter.facing
@@ -146,7 +148,8 @@ def light_records(
         row["reach"], row["extent"] = planned.reach + aside, emitter.extent
         row["is_sky"] = planned.light.kind == "dome"
         _set_shaping(row, planned.light.shaping)
-        _set_profile(row, planned.light, profiles)
+        _set_profile(row, planned.light, tables.profiles)
+        row["first_link"] = tables.links.lights.get(planned.light, ALL_LINKED)
     if shadows:
         records["first_shadow"], records["shadow_count"] = shadows.first, shadows.count
     return records

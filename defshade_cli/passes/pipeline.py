@@ -13,15 +13,17 @@ from defshade_cli.gpu.residence import LIGHTS, VIEW, DrawList, GpuScene, RecordB
 from defshade_cli.gpu.targets import Target
 from defshade_cli.image.film import Film
 from defshade_cli.passes.accumulation import AccumulationPass
-from defshade_cli.passes.emitters import light_batches
+from defshade_cli.passes.emitters import LitSample, light_batches
 from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
+from defshade_cli.passes.identification import Manifests, Mattes, id_manifests
 from defshade_cli.passes.lighting import LightingPass, LightingVariant, light_records
-from defshade_cli.passes.profiles import ProfileTables
+from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
-from defshade_cli.passes.shadows import ShadowPass
+from defshade_cli.passes.shadows import ShadowAtlas, ShadowPass
+from defshade_cli.passes.tables import LightTables, TableStore
 from defshade_cli.passes.view import view_record
 from defshade_cli.plan import Plan
 from defshade_cli.scene.scene import Scene
@@ -41,24 +43,27 @@ class Pipeline:
         self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant))
         self._environment_pass = cache(lambda variant: EnvironmentPass(gpu, variant))
         self._shadow_pass = cache(
-            lambda cutout, color_varies, texture_groups: ShadowPass(
-                gpu, cutout=cutout, color_varies=color_varies, texture_groups=texture_groups
+            lambda cutout, color_varies, texture_groups, linked: ShadowPass(
+                gpu, cutout=cutout, color_varies=color_varies, texture_groups=texture_groups, linked=linked
             )
         )
-        self._profiles = ProfileTables(gpu)
+        self._tables = TableStore(gpu)
         self._accumulation = AccumulationPass(gpu)
 
     def render(self, scene: Scene, plan: Plan) -> Film:
         """The plan's layers. Raises GpuError."""
         self._gpu.make_current()
-        draws = self._scene.update(scene, layer_uv=plan.reads("LAYER_UV"))
+        draws = self._scene.update(scene, plan.inputs)
         layers: dict[str, NDArray[np.float32]] = {}
+        manifests: Manifests = {}
         if plan.sampled:
-            layers |= self._sampled_layers(draws, scene, plan)
+            layers, manifests = self._sampled_layers(draws, scene, plan)
         if plan.data_layers:
-            layers |= data_layers(self._data_planes(draws, plan), plan)
+            data = data_layers(self._data_planes(draws, plan), plan, scene)
+            layers, manifests = layers | data, manifests | id_manifests(data, scene)
         return Film(
             layers={name: layers[name] for name in plan.layers},
+            manifests=manifests,
             camera=plan.display_camera,
             origin=plan.window.origin,
             display=plan.display,
@@ -74,37 +79,55 @@ class Pipeline:
         self._gpu.make_current()
         return self._drawn_planes(self._scene.update(scene), plan.planes, plan)
 
-    def _sampled_layers(self, draws: DrawList, scene: Scene, plan: Plan) -> dict[str, NDArray[np.float32]]:
-        """What is a mean of samples."""
+    def _sampled_layers(
+        self, draws: DrawList, scene: Scene, plan: Plan
+    ) -> tuple[dict[str, NDArray[np.float32]], Manifests]:
+        """What is a mean of samples, and what ids in it stand for."""
+        mattes = Mattes(scene, plan)
         gbuffer = self._frame.gbuffer(plan.size, plan.planes, plan.layout)
         radiance = self._frame.radiance("sample", plan.size, gbuffer)
         total = self._frame.radiance("total", plan.size) if plan.samples > 1 else radiance
         total.framebuffer.clear()
+        tables = self._tables.update(plan)
         for sample in samples(plan.samples, plan.filter, plan.filter_width):
             self._draw_gbuffer(draws, plan, gbuffer, sample)
-            self._light(draws, scene, plan, sample, gbuffer, radiance)
+            if plan.mattes:
+                mattes.add(gbuffer.target.read("visible"))
+            self._light(draws, scene, plan, sample, tables, gbuffer, radiance)
             if plan.samples > 1:
                 self._accumulation.add(radiance, total)
         beauty = np.divide(total.read("radiance"), plan.samples, dtype=np.float32)
-        return {"beauty": beauty, "alpha": beauty[..., 3:]}
+        return {"beauty": beauty, "alpha": beauty[..., 3:]} | mattes.layers(), mattes.manifests()
 
     def _light(
-        self, draws: DrawList, scene: Scene, plan: Plan, sample: Sample, gbuffer: GBuffer, radiance: Target
+        self,
+        draws: DrawList,
+        scene: Scene,
+        plan: Plan,
+        sample: Sample,
+        tables: LightTables,
+        gbuffer: GBuffer,
+        radiance: Target,
     ) -> None:
         """One sample of every light: as many at a time as the shadow atlas holds."""
         lighting = self._lighting_pass(LightingVariant.of(plan))
         lighting.begin(gbuffer, radiance)
         for dome in plan.domes:
-            self._environment_pass(EnvironmentVariant.of(plan)).draw(dome, gbuffer, radiance)
-        profiles = self._profiles.update(plan.profiles)
+            environment = self._environment_pass(EnvironmentVariant.of(plan))
+            environment.draw(dome, gbuffer, radiance, tables.links.lights.get(dome, ALL_LINKED))
         for batch in light_batches(scene, plan, sample) if plan.lit else ():
-            shadows = None
-            if plan.shadows:
-                shadow_pass = self._shadow_pass(plan.cutout, draws.color_varies, draws.texture_groups)
-                shadows = shadow_pass.draw(draws, [lit.shadow_cameras for lit in batch], sample.texel_offset)
+            shadows = self._shadow_maps(draws, batch, plan, sample, tables) if plan.shadows else None
             lights, emitters = [lit.planned for lit in batch], [lit.emitter for lit in batch]
-            self._lights.write(light_records(lights, emitters, plan.camera.position, shadows, plan.profiles))
-            lighting.add(lights, gbuffer, radiance, shadows, profiles)
+            self._lights.write(light_records(lights, emitters, plan.camera.position, shadows, tables))
+            lighting.add(lights, gbuffer, radiance, shadows, tables)
+
+    def _shadow_maps(
+        self, draws: DrawList, batch: list[LitSample], plan: Plan, sample: Sample, tables: LightTables
+    ) -> ShadowAtlas:
+        shadow_pass = self._shadow_pass(plan.cutout, draws.color_varies, draws.texture_groups, plan.shadow_linked)
+        cameras = [lit.shadow_cameras for lit in batch]
+        casters = [tables.links.casts.get(lit.planned.light, ALL_LINKED) for lit in batch]
+        return shadow_pass.draw(draws, cameras, sample.texel_offset, casters)
 
     def _data_planes(self, draws: DrawList, plan: Plan) -> Planes:
         """Planes for the data layers: the beauty's own where it drew them in float at the pixels' centres.

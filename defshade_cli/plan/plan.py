@@ -37,10 +37,12 @@ class Plan:
     filter_width: pixels.
     planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
     lights: sorted quads, spheres, cones.
-    shadows: some light casts them.  background: domes are seen where no geometry is.
+    shadows: some light casts them.  shadow_linked: in some light not all geometry does.
+    background: domes are seen where no geometry is.
     cutout: some opacity may be below 1.  textures: some material reads them.
     data_pass: data layers need an unjittered float GBuffer of their own.
     levels: how often subdivision surfaces were refined, ascending; empty without any.
+    ranks: (id, coverage) pairs of a Cryptomatte.
     """
 
     display: tuple[int, int]
@@ -60,12 +62,14 @@ class Plan:
     data_planes: tuple[Plane, ...]
     lights: tuple[PlannedLight, ...]
     shadows: bool
+    shadow_linked: bool
     background: bool
     cutout: bool
     textures: bool
     data_pass: bool
     complexity: Complexity
     levels: tuple[int, ...]
+    ranks: int
 
     @property
     def size(self) -> tuple[int, int]:
@@ -87,9 +91,15 @@ class Plan:
         """Those read from planes at the pixels' centres."""
         return tuple(name for name in self.layers if not LAYERS[name].is_sampled)
 
-    def reads(self, define: str) -> bool:
-        """Must the GBuffer's shaders interpolate what `define` names?"""
-        return any(define in plane.inputs for plane in (*self.planes, *self.data_planes))
+    @property
+    def inputs(self) -> frozenset[str]:
+        """What the planes need of the vertices beside what lighting does."""
+        return frozenset(name for plane in (*self.planes, *self.data_planes) for name in plane.inputs)
+
+    @property
+    def mattes(self) -> tuple[str, ...]:
+        """The layers that are Cryptomattes."""
+        return tuple(name for name in self.layers if LAYERS[name].source == "matte")
 
     @property
     def domes(self) -> tuple[DomeLight, ...]:
@@ -150,11 +160,13 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         data_planes=data_planes,
         lights=lights,
         shadows=shadows,
+        shadow_linked=shadows and scene.shadow_linked,
         background=settings.background,
         cutout=cutout,
         textures=bool(scene.textures),
         data_pass=data_pass,
         complexity=settings.complexity,
+        ranks=settings.cryptomatte_levels,
         levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None})),
     )
 
@@ -175,13 +187,19 @@ def _divide_planes(
     are too many.
     """
     rows = [LAYERS[name] for name in layers]
-    lit = needed_planes(scene.materials) if any(row.source == "lighting" for row in rows) else ()
+    lit = _lit_planes(scene) if any(row.source == "lighting" for row in rows) else ()
+    lit += named_planes("visible" for row in rows if row.source == "matte")
     data = named_planes(row.source for row in rows)
     both = named_planes(plane.name for plane in (*lit, *data))
     sampled, has_data = any(row.is_sampled for row in rows), not all(row.is_sampled for row in rows)
     exact = settings.layout == "float" and settings.samples == 1 and not cutout and len(both) <= MOST_TARGETS
     data_pass = has_data and not (sampled and exact)
     return (lit if data_pass or not has_data else both), data, data_pass
+
+
+def _lit_planes(scene: Scene) -> tuple[Plane, ...]:
+    names = [plane.name for plane in needed_planes(scene.materials)]
+    return named_planes([*names, *["links"] * scene.light_linked])
 
 
 def _has_cutout(scene: Scene) -> bool:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from defshade_cli.scene.arrays import frozen
 from defshade_cli.scene.environment import Environment
 from defshade_cli.scene.ies import IesProfile
+from defshade_cli.scene.linking import Links
 from defshade_cli.scene.radiance_map import RadianceMap
 from defshade_cli.scene.texture import ImageFile
 from defshade_cli.spaces import Matrix, normalize
@@ -75,6 +76,7 @@ class Light(ABC):
     world_from_light: (4, 4) float64, scale included: sizes are world-space ones.
     color: (3,) float64 scene-linear, colour temperature multiplied in.
     diffuse, specular: UsdLux's multipliers of the two responses.
+    links: None where all geometry is lit and casts shadows.
     """
 
     path: str
@@ -87,6 +89,7 @@ class Light(ABC):
     specular: float = 1.0
     shaping: Shaping | None = None
     casts_shadow: bool = True
+    links: Links | None = None
 
     kind: ClassVar[str]
     is_infinite: ClassVar[bool] = False
@@ -188,6 +191,11 @@ class SphereLight(Light):
     radius: float = 0.5
     treat_as_point: bool = False
     kind = "sphere"
+
+    @property
+    def world_radius(self) -> float:
+        """The greatest, where the transform makes an ellipsoid of the sphere."""
+        return self.radius * float(np.linalg.norm(self.world_from_light[:3, :3], ord=2))
 
     @property
     def size_factor(self) -> float:

@@ -30,6 +30,7 @@ class Standing(NamedTuple):
     """What a prim hands down.
 
     in_world: root_from_prim leads to world space, because an xform stack was reset.
+    draw_mode: of the models below; None below what is no model, where there are no others.
     rig: the outermost SkelRoot.
     proxied: the prototype that is walked and an instance of it, by whose proxies its prims are known on the stage.
     """
@@ -37,6 +38,7 @@ class Standing(NamedTuple):
     root_from_prim: Gf.Matrix4d = IDENTITY
     in_world: bool = False
     purpose: str | None = None
+    draw_mode: str | None = None
     rig: Rig | None = None
     proxied: tuple[Sdf.Path, Sdf.Path] | None = None
 

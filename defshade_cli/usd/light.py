@@ -1,6 +1,6 @@
 """UsdLux lights in scene terms.
 
-What the scene cannot say yet (lights made of geometry, portals, plug-in lights, filters, linking, connected inputs)
+What the scene cannot say yet (lights made of geometry, portals, plug-in lights, filters, connected inputs)
 is reported; a light that has some of these is read without them.
 """
 
@@ -111,11 +111,7 @@ def _shaping(prim: Usd.Prim, time: Usd.TimeCode) -> Shaping:
 
 
 def _left_out(prim: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
-    api = UsdLux.LightAPI(prim)
-    for link in (api.GetLightLinkCollectionAPI(), api.GetShadowLinkCollectionAPI()):
-        if not link.GetIncludeRootAttr().Get() or link.GetExcludesRel().HasAuthoredTargets():
-            yield f"{link.GetName()} is ignored: everything is linked"
-    if api.GetFiltersRel().GetForwardedTargets():
+    if UsdLux.LightAPI(prim).GetFiltersRel().GetForwardedTargets():
         yield "light filters are ignored"
     connected = [attr.GetName() for attr in prim.GetAuthoredAttributes() if attr.HasAuthoredConnections()]
     if connected:

@@ -21,8 +21,10 @@ from defshade_cli.usd import stage as facts
 from defshade_cli.usd.camera import choose_camera, find_cameras, framed_camera, read_camera
 from defshade_cli.usd.complexity import View, choose_levels
 from defshade_cli.usd.geometry import Gprim, Surface
+from defshade_cli.usd.identity import read_assets
 from defshade_cli.usd.instancing import Piece
 from defshade_cli.usd.light import camera_light
+from defshade_cli.usd.linking import link
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.palette import Palette
 from defshade_cli.usd.settings import read_settings
@@ -57,6 +59,7 @@ class StageReader:
     ) -> None:
         self._stage, self._purposes = stage, tuple(purposes)
         self._complexity, self._size, self._width = complexity, size, width
+        self._extras = extras
         self._memory = Memory(stage, extras)
         self._tessellation = Tessellation()
         self._settings = read_settings(stage)
@@ -94,14 +97,14 @@ class StageReader:
         gprims = self._tessellate(drawn, camera)
         palette = Palette(self._memory, time)
         meshes: dict[Mesh, int] = {}
-        drawables = tuple(_drawables(drawn, gprims, meshes, palette))
+        lights, drawables = link(self._stage, list(_lights(pieces)), list(_drawables(drawn, gprims, meshes, palette)))
         mended = dict.fromkeys(issue for gprim in gprims.values() for issue in gprim.issues)
         return Scene(
             name=facts.stage_name(self._stage),
             meshes=tuple(meshes),
             drawables=drawables,
             materials=palette.materials,
-            lights=tuple(_lights(pieces)),
+            lights=lights,
             camera=camera,
             cameras=self._cameras,
             unsupported=(*self._issues, *traversal.issues, *mended, *palette.issues, *camera_issues),
@@ -113,6 +116,7 @@ class StageReader:
             pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
             data_window=self._settings.data_window,
+            assets=read_assets(self._stage, _paths(drawables)) if self._extras.assets else {},
             rendering_space=self._settings.rendering_space,
         )
 
@@ -159,6 +163,11 @@ def _drawables(
             display_color=np.nan_to_num(piece.display_color, nan=UNBOUND.diffuse_color[0]),
             display_opacity=np.nan_to_num(piece.display_opacity, nan=UNBOUND.opacity),
         )
+
+
+def _paths(drawables: Iterable[Drawable]) -> dict[str, None]:
+    """Of every prim that is drawn, each once."""
+    return dict.fromkeys(path for drawable in drawables for path in drawable.paths)
 
 
 def _lights(pieces: Iterable[Piece]) -> Iterator[Light]:

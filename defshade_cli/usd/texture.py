@@ -37,7 +37,7 @@ def read_texture_input(network: Network, output: Usd.Attribute) -> TextureInput:
         raise Unreadable("texture without file")
     uv, texture_from_uv = _coordinates(network, network.source(node, "st"))
     texture = Texture(
-        tiles=_tiles(asset, attribute),
+        tiles=image_tiles(asset, attribute),
         udim=UsdShade.UdimUtils.IsUdimIdentifier(asset.path),
         color_space=_one_of(network.value(node, "sourceColorSpace"), get_args(ColorSpace), "auto"),
         wrap_s=_one_of(network.value(node, "wrapS"), get_args(Wrap), "useMetadata"),
@@ -82,8 +82,11 @@ def _product(outer: Affine, inner: Affine) -> Affine:
     return tuple(first), tuple(second)
 
 
-def _tiles(asset: Sdf.AssetPath, attribute: Usd.Attribute) -> tuple[tuple[int, ImageFile], ...]:
-    """Files of the asset as Ar resolves it; back slashes, which exporters on Windows leave, count as slashes."""
+def image_tiles(asset: Sdf.AssetPath, attribute: Usd.Attribute) -> tuple[tuple[int, ImageFile], ...]:
+    """Files of the asset as Ar resolves it; back slashes, which exporters on Windows leave, count as slashes.
+
+    Raises Unreadable where there is none.
+    """
     layer = attribute.GetPropertyStack()[0].layer
     path = asset.path.replace("\\", "/")
     if UsdShade.UdimUtils.IsUdimIdentifier(path):

@@ -13,8 +13,9 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.scene import Unsupported
-from defshade_cli.usd.binding import Bindings
+from defshade_cli.usd.binding import Bindings, bound_to
 from defshade_cli.usd.copies import Copies, once
+from defshade_cli.usd.draw_mode import FULL, handed_down, mode_above, takes_effect
 from defshade_cli.usd.geometry import Surface, is_time_varying
 from defshade_cli.usd.instancing import Piece, Standing, place
 from defshade_cli.usd.kind import Kind
@@ -44,7 +45,7 @@ class Traversal:
         memory.xforms.SetTime(time)
 
     def read_stage(self) -> tuple[Piece, ...]:
-        return self._read(self._stage.GetPseudoRoot().GetChildren(), Standing())
+        return self._read(self._stage.GetPseudoRoot().GetChildren(), Standing(draw_mode=FULL))
 
     def _read(
         self, roots: Iterable[Usd.Prim], above: Standing, predicate: object = Usd.PrimDefaultPredicate
@@ -58,6 +59,9 @@ class Traversal:
             kind, here = self._memory.kinds.of(prim), self._stand(prim, above)
             if kind is Kind.SHADING or here is None:
                 continue
+            if here.draw_mode not in (None, FULL) and takes_effect(prim):
+                pieces.append(self._stand_in(prim, here))
+                continue
             pieces.extend(self._own_pieces(prim, kind, here))
             if kind is Kind.POINT_INSTANCER:
                 pieces.extend(self._point_instances(prim, here))
@@ -70,9 +74,10 @@ class Traversal:
         return tuple(pieces)
 
     def _stand(self, prim: Usd.Prim, above: Standing) -> Standing | None:
-        """What `prim` hands down, None where it is invisible; what is authored on other than Imageables is ignored."""
+        """What `prim` hands down, None where it is invisible; of other than Imageables only the draw mode counts."""
+        mode = handed_down(prim, above.draw_mode) if above.draw_mode else None
         if not prim.IsA(UsdGeom.Imageable):
-            return above
+            return above if mode == above.draw_mode else above._replace(draw_mode=mode)
         visibility = prim.GetAttribute(UsdGeom.Tokens.visibility)
         if visibility.Get(self._time) == UsdGeom.Tokens.invisible:
             self.dormant |= visibility.ValueMightBeTimeVarying()
@@ -81,7 +86,9 @@ class Traversal:
         root_from_prim = local if resets else local * above.root_from_prim
         purpose = prim.GetAttribute(UsdGeom.Tokens.purpose)
         own = str(purpose.Get()) if purpose.HasAuthoredValue() else above.purpose
-        here = above._replace(root_from_prim=root_from_prim, in_world=resets or above.in_world, purpose=own)
+        here = above._replace(
+            root_from_prim=root_from_prim, in_world=resets or above.in_world, purpose=own, draw_mode=mode
+        )
         return here.with_rig(prim) if prim.IsA(UsdSkel.Root) else here
 
     def _own_pieces(self, prim: Usd.Prim, kind: Kind, here: Standing) -> Iterator[Piece]:
@@ -91,14 +98,18 @@ class Traversal:
             self._report(prim, *(issue.reason for issue in issues))
             if light is not None:
                 yield self._piece(prim, here, light)
-        if mode := _draw_mode(prim):
-            self._report(prim, f"draw mode {mode}: the full geometry is drawn")
         if kind is Kind.GPRIM and here.purpose in (None, *self._purposes):
             yield from self._gprim(prim, here)
         elif kind is Kind.UNDRAWN:
             self._report(prim, f"prims of type {prim.GetTypeName()} are not drawn")
         elif kind is Kind.UNKNOWN:
             self._report(prim, f"no schema defines the type {prim.GetTypeName()}")
+
+    def _stand_in(self, prim: Usd.Prim, here: Standing) -> Piece:
+        """What is drawn in place of a model."""
+        surface = self._memory.stand_in(prim, here.draw_mode or FULL)
+        self.issues.update(dict.fromkeys(surface.issues))
+        return self._piece(prim, here, surface, {path: bound_to(path) for path in surface.groups})
 
     def _gprim(self, prim: Usd.Prim, here: Standing) -> Iterator[Piece]:
         surface = self._memory.surface(prim, self._time)
@@ -176,7 +187,8 @@ class Traversal:
                 return ()
             self._prototypes[key] = None
             above = UsdGeom.Imageable(root.GetParent()).ComputePurposeInfo()
-            standing = Standing(purpose=str(above.purpose) if above.isInheritable else None, proxied=here.proxied)
+            purpose = str(above.purpose) if above.isInheritable else None
+            standing = Standing(purpose=purpose, draw_mode=mode_above(root), proxied=here.proxied)
             self._prototypes[key] = self._read([root], standing, _PROTOTYPE_CHILDREN)
         pieces = self._prototypes[key]
         if pieces is None:
@@ -198,11 +210,3 @@ def _copies_of(content: Surface | Light) -> Copies:
 def _is_rigged_from_above(instance: Usd.Prim, here: Standing) -> bool:
     """Is a SkelRoot above the instance? Its skeletons may deform each instance otherwise."""
     return here.rig is not None and here.rig.root != here.on_stage(instance)
-
-
-def _draw_mode(prim: Usd.Prim) -> str | None:
-    """The draw mode that a model asks for, where it is not the full geometry."""
-    if not prim.HasAPI(UsdGeom.ModelAPI):
-        return None
-    mode = UsdGeom.ModelAPI(prim).GetModelDrawModeAttr().Get()
-    return None if mode in (UsdGeom.Tokens.inherited, UsdGeom.Tokens.default_) else str(mode)

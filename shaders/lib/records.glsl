@@ -16,6 +16,7 @@ struct Instance {
     vec3 display_color;
     float display_opacity;
     float handedness;          // -1 where the placement mirrors
+    uint link_set;
 };
 
 struct Material {
@@ -31,6 +32,7 @@ struct Material {
     float opacity_threshold;
     uint use_specular_workflow;
     uint uses_display_color;
+    uint one_sided;
     uint first_input;          // of its textures
     uint input_count;
     float occlusion;
@@ -76,6 +78,7 @@ struct Light {
     float ies_scale;           // of its candela
     vec3 up;
     uint ies_table;            // its layer; NO_IES for none
+    uint first_link;           // bits of the link sets that it lights: lib/linking.glsl
     vec2 ies_vertical;         // the profile is read at x * angle + y radians
 };
 
