@@ -21,7 +21,7 @@ from pathlib import Path
 from defshade_cli.errors import OutputError
 from defshade_cli.image.encoders import EXR, encode, suffix_of
 from defshade_cli.image.film import Film
-from defshade_cli.image.layers import BEAUTY, in_order
+from defshade_cli.image.layers import BEAUTY, LAYERS, in_order
 from defshade_cli.image.verification import verify
 from defshade_cli.settings import OutputSettings
 
@@ -34,7 +34,8 @@ def targets(layers: Iterable[str], output: OutputSettings, path: Path) -> dict[P
         main = next((v.name for v in output.variables if v.layer == BEAUTY), names[0])
     if not output.split_layers and (suffix_of(path) == EXR or len(names) == 1):
         return {path: names}
-    beside = {name: path.with_name(f"{path.stem}.{name}{path.suffix}") for name in names}
+    labels = {name: name if output.variables else LAYERS[name].exr_name for name in names}
+    beside = {name: path.with_name(f"{path.stem}.{label}{path.suffix}") for name, label in labels.items()}
     if not output.split_layers and main in beside:
         beside[main] = path
     return {file: (name,) for name, file in beside.items()}

@@ -10,6 +10,7 @@ from defshade_cli.errors import OutputError
 from defshade_cli.image.colour import BRIGHTEST, Pixels
 from defshade_cli.image.encoders import EXR, suffix_of
 from defshade_cli.image.film import Film
+from defshade_cli.image.layers import layer_in_file
 from defshade_cli.image.reading import read
 from defshade_cli.settings import OutputSettings
 
@@ -24,7 +25,7 @@ def verify(path: Path, film: Film, names: tuple[str, ...], output: OutputSetting
         _check_shape(names[0], next(iter(layers.values())), film.size)
         return
     for name in names:
-        found = layers.get(film.row(name).name)
+        found = layers.get(layer_in_file(film.row(name).exr_name))
         if found is None:
             raise OutputError(f"verified: layer {name} is missing from what was written")
         _check_shape(name, found, film.size)

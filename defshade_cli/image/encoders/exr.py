@@ -63,7 +63,8 @@ def _part(film: Film, names: tuple[str, ...], output: OutputSettings) -> _Part:
     planes = tuple(bounded(name, film.layers[name], half=name in halves) for name in names)
     spec = _spec(film, names, halves, output.compression)
     if output.multipart:
-        spec.attribute("oiio:subimagename", MAIN_PART if film.row(names[0]).name == BEAUTY else names[0])
+        row = film.row(names[0])
+        spec.attribute("oiio:subimagename", MAIN_PART if row.name == BEAUTY else row.exr_name)
     if output.tiled or output.mipmaps:
         spec.tile_width = spec.tile_height = TILE
     if output.mipmaps:
