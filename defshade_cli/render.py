@@ -162,7 +162,9 @@ def _render_frame(
     with _timed(seconds, "draw"):
         film = pipeline.render(scene, plan)
     with _timed(seconds, "write"):
-        film = replace(film, metadata=provenance | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of})
+        film = replace(
+            film, metadata=provenance | film.metadata | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of}
+        )
         paths = frame_paths(job, frame, reader.camera_name)
         written = tuple(file for path in paths for file in write(film, job.output, path))
     return FrameResult(frame, written, film=film, plan=plan, seconds=seconds)
@@ -170,7 +172,6 @@ def _render_frame(
 
 def _cost(plan: Plan, seconds: float) -> dict[str, Any]:
     return {
-        "samples": plan.samples,
         "layout": plan.layout,
         "shading": plan.shading,
         "seconds": round(seconds, 4),

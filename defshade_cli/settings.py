@@ -25,6 +25,8 @@ COMPRESSIONS: tuple[Compression, ...] = ("zip", "zips", "piz", "dwaa", "none")
 FILTERS: dict[Filter, float] = {"box": 1.0, "gaussian": 2.0, "blackman-harris": 3.0}
 """Widths in pixels, from end to end, where none is asked: those of Arnold."""
 BITS: tuple[Bits, ...] = (8, 16)
+MOST_SAMPLES = 4096
+"""Of a render that the error or the time ends."""
 PURPOSES = ("default", "render", "proxy", "guide")
 
 
@@ -81,7 +83,10 @@ class RenderSettings:
 
     size: (width, height) in pixels; None follows the stage's RenderSettings, then 1920x1080.
     width: pixels; the height then follows the camera's aspect. At most one of size and width is given.
-    samples: jittered samples a pixel; 1 is a sample at the pixel's centre.
+    samples: jittered samples a pixel, or the most of them; 1 is a sample at the pixel's centre. None is 1, or
+        MOST_SAMPLES where the error or the time ends the render.
+    max_error: relative standard error to render to: passes/convergence.py.
+    time_limit: seconds to draw a frame in; the sample that passes them is finished.
     filter: the samples of a pixel fall by it.  filter_width: pixels from end to end; None for the filter's own.
     exposure: stops added to the camera's own.
     shadows: False lights every surface that faces a light.
@@ -92,7 +97,9 @@ class RenderSettings:
 
     size: tuple[int, int] | None = None
     width: int | None = None
-    samples: int = 1
+    samples: int | None = None
+    max_error: float | None = None
+    time_limit: float | None = None
     filter: Filter = "box"
     filter_width: float | None = None
     layout: Layout = "float"

@@ -59,6 +59,10 @@ def _range(name: str, summary: str) -> Layer:
     return Layer(name, ("Z",), SCENE_UNITS, "camera", "depth", inf, False, summary)
 
 
+def _sampling(name: str, unit: str, summary: str) -> Layer:
+    return Layer(name, ("Y",), unit, "none", "lighting", 0.0, True, summary)
+
+
 _RGBA, _XYZ = ("R", "G", "B", "A"), ("X", "Y", "Z")
 
 LAYERS: dict[str, Layer] = {
@@ -73,6 +77,8 @@ LAYERS: dict[str, Layer] = {
         _scalar("metallic", "metallic", "metalness"),
         _scalar("roughness", "roughness", "perceptual roughness; GGX alpha is its square"),
         _color("emission", "emission", "emitted radiance"),
+        _sampling("variance", "scene-linear²", "variance of the beauty's luminance, as a mean of samples"),
+        _sampling("sampleCount", "samples", "samples of the beauty"),
     )
 }  # fmt: skip
 

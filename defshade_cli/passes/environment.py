@@ -16,6 +16,7 @@ from defshade_cli.gpu.planes import Plane, read_source
 from defshade_cli.gpu.targets import Target
 from defshade_cli.image.environment import sky_of
 from defshade_cli.passes.gbuffer import GBuffer
+from defshade_cli.passes.screen import Screen
 from defshade_cli.plan import Plan
 from defshade_cli.scene.environment import Environment
 from defshade_cli.scene.light import DomeLight
@@ -49,12 +50,12 @@ class EnvironmentVariant:
 class EnvironmentPass:
     """Compiled for one variant; keeps the skies it has drawn as textures."""
 
-    def __init__(self, gpu: Gpu, variant: EnvironmentVariant) -> None:
+    def __init__(self, gpu: Gpu, variant: EnvironmentVariant, screen: Screen) -> None:
         self._gpu = gpu
         generated = {"generated/planes.glsl": read_source(variant.planes, variant.layout)}
         files = ("screen.vert", "environment.frag")
         self._program = gpu.shaders.program(*files, defines=variant.defines, generated=generated)
-        self._screen = gpu.keep(gpu.context.vertex_array(self._program, []))
+        self._screen, self._array = screen, screen.array(self._program)
         self._skies: dict[Environment, moderngl.Texture] = {}
 
     def draw(self, dome: DomeLight, gbuffer: GBuffer, radiance: Target) -> None:
@@ -67,7 +68,7 @@ class EnvironmentPass:
         for name, value in _uniforms(dome, sky).items():
             if name in self._program:
                 self._program[name] = value
-        self._screen.render(vertices=3)
+        self._screen.draw(self._array)
 
     def _texture(self, sky: Environment) -> moderngl.Texture:
         if sky not in self._skies:

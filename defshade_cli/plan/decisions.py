@@ -38,6 +38,7 @@ def explain(plan: Plan) -> Iterator[Decision]:
     if any(LAYERS[name].source != "lighting" for name in plan.layers):
         jittered, shared = "the beauty's is jittered, quantised or dithered", "the beauty's own float sample serves"
         yield _kept("data GBuffer", plan.data_pass or not plan.lit, jittered if plan.lit else "as asked", shared)
+    yield _kept("error estimate", plan.tracks_error, "as asked", "nothing needs it")
     if not plan.lit:
         yield Decision("lighting", "skipped", "no layer needs it")
 

@@ -16,7 +16,7 @@ from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
-from defshade_cli.settings import FILTERS, Complexity, Filter, Layout, RenderSettings, Shading
+from defshade_cli.settings import FILTERS, MOST_SAMPLES, Complexity, Filter, Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
 from defshade_cli.units import exposure_scale
 
@@ -29,7 +29,7 @@ class Plan:
 
     camera: conformed to the image.  clip: (near, far), the camera's range tightened to the geometry.
     exposure: linear, the camera's and the settings' together.
-    filter_width: pixels.
+    samples: a pixel at most.  max_error, time_limit: of RenderSettings.  filter_width: pixels.
     planes: of the GBuffer; lights: sorted quads, spheres, cones.
     shadows: some light casts them.  background: domes are seen where no geometry is.
     cutout: some opacity may be below 1.  textures: some material reads them.
@@ -44,6 +44,8 @@ class Plan:
     layout: Layout
     shading: Shading
     samples: int
+    max_error: float | None
+    time_limit: float | None
     filter: Filter
     filter_width: float
     layers: tuple[str, ...]
@@ -63,6 +65,12 @@ class Plan:
         return any(LAYERS[name].source == "lighting" for name in self.layers)
 
     @property
+    def tracks_error(self) -> bool:
+        """Is the error of the mean asked for?"""
+        asked = self.max_error is not None or self.time_limit is not None or "variance" in self.layers
+        return self.lit and self.samples > 1 and asked
+
+    @property
     def domes(self) -> tuple[DomeLight, ...]:
         return tuple(planned.light for planned in self.lights if isinstance(planned.light, DomeLight))
 
@@ -76,7 +84,7 @@ class Plan:
         """Names of the passes in the order of the pipeline."""
         before = ("gbuffer", "emission", *("environment",) * bool(self.domes), *("shadow maps",) * self.shadows)
         lighting = before + tuple(f"light {volume}" for volume in self.volumes)
-        accumulation = ("accumulation",) * (self.samples > 1)
+        accumulation = ("accumulation",) * (self.samples > 1) + ("batch means",) * self.tracks_error
         data = ("data gbuffer",) * (self.data_pass or not self.lit)
         return (lighting + accumulation if self.lit else ()) + data
 
@@ -96,8 +104,9 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     planes = needed_planes(scene.materials, settings.layers)
     cutout = _has_cutout(scene)
     shadows = settings.shadows and bool(scene.drawables) and any(p.light.casts_shadow for p in lights)
+    samples = settings.samples or (MOST_SAMPLES if settings.max_error or settings.time_limit else 1)
     data_layers = [name for name in settings.layers if LAYERS[name].source != "lighting"]
-    data_pass = bool(data_layers) and (settings.layout != "float" or settings.samples > 1 or cutout)
+    data_pass = bool(data_layers) and (settings.layout != "float" or samples > 1 or cutout)
     return Plan(
         size=size,
         camera=camera,
@@ -105,7 +114,9 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         exposure=exposure,
         layout=settings.layout,
         shading=settings.shading,
-        samples=settings.samples,
+        samples=samples,
+        max_error=settings.max_error,
+        time_limit=settings.time_limit,
         filter=settings.filter,
         filter_width=settings.filter_width or FILTERS[settings.filter],
         layers=settings.layers,
