@@ -17,6 +17,8 @@ from defshade_cli.farm.targets import FINGERPRINT, check_outputs, frame_files, f
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.files import write
 from defshade_cli.image.film import Film
+from defshade_cli.image.layers import resolve
+from defshade_cli.image.layers.extras import extras_of
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import Plan, make_plan
 from defshade_cli.scene.scene import Scene
@@ -120,8 +122,10 @@ def render(
     known = {f.name for f in fields(RenderSettings)}
     if unknown := sorted(options.keys() - known):
         raise UsageError(f"no render option named {', '.join(unknown)}; there are {', '.join(sorted(known))}")
+    settings = RenderSettings(**options)
+    settings = replace(settings, layers=resolve(settings.layers))
     frames = (frame,) if frame is not None else ()
-    job = RenderJob(Path(stage), frames, camera, composition or Composition(), RenderSettings(**options))
+    job = RenderJob(Path(stage), frames, camera, composition or Composition(), settings)
     with closing(run(job)) as results:
         result = next(results)
     assert result.film is not None
@@ -137,6 +141,7 @@ def _reader(job: RenderJob) -> StageReader:
         complexity=settings.complexity,
         size=settings.size,
         width=settings.width,
+        extras=extras_of(settings.layers),
     )
 
 

@@ -83,11 +83,15 @@ class RenderSettings:
 
     size: (width, height) in pixels; None follows the stage's RenderSettings, then 1920x1080.
     width: pixels; the height then follows the camera's aspect. At most one of size and width is given.
+    crop: (x, y, width, height) of the pixels that are rendered, from the image's top left corner, which they may leave;
+        None follows the stage's RenderSettings, then the whole image.
     samples: jittered samples a pixel, or the most of them; 1 is a sample at the pixel's centre. None is 1, or
         MOST_SAMPLES where the error or the time ends the render.
     max_error: relative standard error to render to: passes/convergence.py.
     time_limit: seconds to draw a frame in; the sample that passes them is finished.
     filter: the samples of a pixel fall by it.  filter_width: pixels from end to end; None for the filter's own.
+    render_space: the scene-linear colour space of the image, by a name that the OCIO config knows; None follows the
+        stage's RenderSettings, then linear Rec.709.  ocio: the config, a file or ocio://NAME; empty for $OCIO's.
     exposure: stops added to the camera's own.
     shadows: False lights every surface that faces a light.
     complexity: how finely subdivision surfaces are refined: by their size in the image, or 0 to 3 levels all alike.
@@ -97,6 +101,7 @@ class RenderSettings:
 
     size: tuple[int, int] | None = None
     width: int | None = None
+    crop: tuple[int, int, int, int] | None = None
     samples: int | None = None
     max_error: float | None = None
     time_limit: float | None = None
@@ -105,6 +110,8 @@ class RenderSettings:
     layout: Layout = "float"
     shading: Shading = "preview-surface"
     layers: tuple[str, ...] = ("beauty",)
+    render_space: str | None = None
+    ocio: str = ""
     exposure: float = 0.0
     purposes: tuple[str, ...] = ("default", "render")
     light_tolerance: float = 1e-5
@@ -112,13 +119,19 @@ class RenderSettings:
     complexity: Complexity = "auto"
     background: bool = True
 
+    @property
+    def most_samples(self) -> int:
+        """`samples`, or what stands for it."""
+        open_ended = self.max_error is not None or self.time_limit is not None
+        return self.samples or (MOST_SAMPLES if open_ended else 1)
+
 
 @dataclass(frozen=True, slots=True)
 class OutputSettings:
     """How a film becomes files.
 
     patterns: file names with frame and name tokens; the suffix picks the format. One file per pattern and frame.
-    display, view: of the OCIO config, for display-referred formats; None takes the config's default.
+    display, view, look: of the OCIO config, for display-referred formats; None takes the config's default, and no look.
     full_float: 32-bit channels in EXR in place of half (data layers are always 32-bit).
     multipart: a part of the EXR for each layer.  tiled: EXR in tiles; mipmaps: in tiles with all smaller levels.
     bits: a channel of a picture; None takes the format's default.  dither: 8-bit colours, against banding.
@@ -129,6 +142,7 @@ class OutputSettings:
     existing: Existing = "overwrite"
     display: str | None = None
     view: str | None = None
+    look: str | None = None
     full_float: bool = False
     compression: Compression = "zip"
     split_layers: bool = False

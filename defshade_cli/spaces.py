@@ -64,6 +64,19 @@ def inverse_rigid(b_from_a: Matrix) -> Matrix:
     return inverse
 
 
+def is_similarity(matrix: Matrix) -> bool:
+    """Whether spheres stay spheres, to float32's rounding."""
+    scales = np.linalg.svd(matrix[:3, :3], compute_uv=False)
+    return bool(scales[0] - scales[2] <= 1e-5 * scales[0])
+
+
+def frame_along(direction: NDArray) -> NDArray[np.float64]:
+    """(3, 3) a rotation whose third column points along `direction` (3,); +Z for a zero vector."""
+    z = normalize(np.asarray(direction, np.float64)) if np.any(direction) else np.array([0.0, 0.0, 1.0])
+    x = normalize(np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z))
+    return np.column_stack([x, np.cross(z, x), z])
+
+
 def conform_window(window: Window, aspect: float, policy: ConformPolicy = "expandAperture") -> Window:
     """Fit (left, right, bottom, top) to the image's aspect as UsdRenderSettings' aspectRatioConformPolicy says.
 

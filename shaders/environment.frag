@@ -2,6 +2,11 @@
 #include "lib/surface.glsl"
 #include "lib/environment.glsl"
 #include "generated/planes.glsl"
+#ifdef PLANE_LINKS
+#include "lib/linking.glsl"
+
+uniform uint first_link;
+#endif
 
 uniform vec2 response;             // of the diffuse and of the specular lobe
 out vec4 radiance;
@@ -21,6 +26,9 @@ vec3 mirrored_sky(vec3 n, vec3 v, float roughness) {
 }
 
 vec3 reflected_sky(Surface s, vec3 v) {
+#ifdef PLANE_LINKS
+    if (!is_linked(first_link, s.link_set)) return vec3(0.0);
+#endif
     float NoV = max(dot(s.normal, v), MIN_NOV);
     vec3 albedo = E_bound(s.f0, s.f90, NoV, GGX_alpha(s.roughness), SMITH_GGX);
     vec3 result = albedo * mirrored_sky(s.normal, v, s.roughness);

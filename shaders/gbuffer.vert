@@ -10,6 +10,10 @@ in vec4 vertex_color;          // alpha is opacity; negative: the instance's val
 #ifdef TEXTURES
 in vec4 vertex_uv;             // two sets
 #endif
+#ifdef LAYER_UV
+in vec2 vertex_layer_uv;
+out vec2 layer_uv;
+#endif
 in uvec2 draw;                 // instance, material
 
 out vec3 normal_relative;
@@ -17,8 +21,13 @@ out vec4 display_color;
 flat out uint material_index;
 flat out uint instance_index;
 flat out float handedness;
-#ifdef TEXTURES
+#ifdef PLANE_LINKS
+flat out uint link_set;
+#endif
+#ifdef POSITION
 out vec3 position_relative;
+#endif
+#ifdef TEXTURES
 out vec4 uv;
 #endif
 
@@ -34,9 +43,17 @@ void main() {
     instance_index = draw.x;
     material_index = draw.y;
     handedness = instance.handedness;
-#ifdef TEXTURES
+#ifdef PLANE_LINKS
+    link_set = instance.link_set;
+#endif
+#ifdef POSITION
     position_relative = position.xyz;
+#endif
+#ifdef TEXTURES
     uv = vertex_uv;
+#endif
+#ifdef LAYER_UV
+    layer_uv = vertex_layer_uv;
 #endif
     gl_Position = view.clip_from_relative * vec4(position.xyz, 1.0);
 }

@@ -2,6 +2,10 @@
 #include "lib/surface.glsl"
 #include "lib/light.glsl"
 #include "lib/shadow.glsl"
+#ifdef PLANE_LINKS
+#include "lib/linking.glsl"
+#endif
+#include "lib/render_space.glsl"
 #include "generated/planes.glsl"
 
 // A lobe that is wider by the patch of light that one point stands for.
@@ -33,12 +37,19 @@ void main() {
     vec3 irradiance = irradiance_from(lights[light_index], position, l);
     if (irradiance == vec3(0.0)) discard;
     Surface surface = read_planes(pixel);
+<<<<<<< HEAD
+    irradiance *= visibility(lights[light_index], position, l);
+=======
+#ifdef PLANE_LINKS
+    if (!is_linked(lights[light_index].first_link, surface.link_set)) discard;
+#endif
     irradiance *= visibility(lights[light_index], position, surface.normal, l);
+>>>>>>> main
     float widening = patch_alpha_squared(lights[light_index], position, l);
     if (widening > 0.0) {
         surface.roughness = widened_roughness(surface.roughness, widening);
         surface.clearcoat_roughness = widened_roughness(surface.clearcoat_roughness, widening);
     }
     vec3 f = evaluate_brdf(surface, direction_to_eye(position), l, lobe_response(lights[light_index], surface));
-    radiance = vec4(view.exposure * irradiance * f, 0.0);
+    radiance = vec4(view.exposure * render_from_rec709(irradiance) * f, 0.0);
 }

@@ -2,6 +2,11 @@
 
 layout(std430, binding = 1) readonly buffer InstanceBlock { Instance instances[]; };
 
+#ifdef LINKS
+#include "lib/linking.glsl"
+
+uniform uint first_caster;     // bits of the link sets that cast
+#endif
 uniform mat4 clip_from_relative;
 
 in vec3 position_object;
@@ -23,6 +28,9 @@ void main() {
     Instance instance = instances[draw.x];
     vec4 position = instance.relative_from_object * vec4(position_object, 1.0);
     gl_Position = clip_from_relative * vec4(position.xyz, 1.0);
+#ifdef LINKS
+    if (!is_linked(first_caster, instance.link_set)) gl_Position = vec4(2.0, 2.0, 2.0, 1.0); // nowhere in the map
+#endif
 #ifdef CUTOUT
     instance_index = draw.x;
     material_index = draw.y;

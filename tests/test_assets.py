@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.errors import DefshadeError, EmptyStage
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.image.colour import to_display
+from defshade_cli.image.colour import display_transform
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.settings import RenderSettings
@@ -68,7 +68,7 @@ def _write_sheet(pictures: list[NDArray[np.float32]]) -> None:
         y, x = divmod(i, COLUMNS)
         sheet[y * height : (y + 1) * height, x * width : (x + 1) * width] = picture
     SHEET.parent.mkdir(exist_ok=True)
-    image = oiio.ImageBuf(np.ascontiguousarray(to_display(sheet, display=None, view=None)[..., :3]))
+    image = oiio.ImageBuf(np.ascontiguousarray(display_transform().apply(sheet)[..., :3]))
     assert image.write(str(SHEET), "uint8"), image.geterror()
 
 

@@ -13,8 +13,11 @@ from hypothesis import strategies as st
 from pxr import UsdGeom
 
 from defshade_cli.errors import PrimNotFound, StageError
+from defshade_cli.plan import make_plan
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.scene import Scene
+from defshade_cli.scene.window import DataWindow
+from defshade_cli.settings import RenderSettings
 from defshade_cli.spaces import transform_points
 from defshade_cli.usd.camera import FRAMED, find_cameras, framed_camera
 from defshade_cli.usd.reader import StageReader
@@ -296,9 +299,11 @@ def test_effects_can_be_switched_off(body: str, shutter: tuple[float, float], f_
     assert (camera.shutter, camera.f_stop) == (shutter, f_stop)
 
 
-def test_a_data_window_is_reported() -> None:
-    scene = settings("float4 dataWindowNDC = (0, 0, 0.5, 1)")
-    assert reasons(scene, "/Render/s") == ["dataWindowNDC: the whole window is rendered"]
+def test_a_data_window_renders_a_part() -> None:
+    scene = settings("float4 dataWindowNDC = (0, 0, 0.5, 1)\nint2 resolution = (64, 48)")
+    plan = make_plan(scene, RenderSettings())
+    assert (plan.window, plan.display) == (DataWindow(0, 0, 32, 48), (64, 48))
+    assert make_plan(scene, RenderSettings(crop=(-1, 2, 3, 4))).window == DataWindow(-1, 2, 3, 4)
 
 
 def test_every_camera_is_listed() -> None:

@@ -13,8 +13,9 @@ import OpenImageIO as oiio
 import pytest
 
 from defshade_cli.errors import UsageError
-from defshade_cli.image.colour import display_space, displays, picture, resolve_view, to_display
+from defshade_cli.image.colour import display_transform, picture
 from defshade_cli.image.layers import LAYERS
+from defshade_cli.image.ocio import displays
 from films import film, layer_values
 
 SRGB, ACES, PLAIN = "sRGB - Display", "ACES 2.0 - SDR 100 nits (Rec.709)", "Un-tone-mapped"
@@ -33,6 +34,10 @@ colorspaces:
 """
 
 pytestmark = pytest.mark.skipif("OCIO" in os.environ, reason="these tests speak of the built-in config")
+
+
+def to_display(pixels: np.ndarray, *, straight: bool = False, **choice: str) -> np.ndarray:
+    return display_transform(**choice).apply(pixels, straight=straight)
 
 
 def grey(value: float, alpha: float = 1.0) -> np.ndarray:
@@ -61,7 +66,7 @@ def test_greys_follow_srgb() -> None:
 
 def test_the_default_is_tone_mapped() -> None:
     """ACES 2.0 puts 18 % grey at 10 nits of 100: 0.1 through the inverse sRGB curve is 0.349."""
-    assert resolve_view(None, None) == (SRGB, ACES)
+    assert (display_transform().display, display_transform().view) == (SRGB, ACES)
     np.testing.assert_allclose(to_display(grey(0.18))[0, 0], [0.349, 0.349, 0.349, 1], atol=0.002)
     assert to_display(grey(1000.0))[0, 0, 0] == pytest.approx(1, abs=0.01)
 
@@ -103,8 +108,8 @@ def test_the_source_is_not_written_to() -> None:
 
 def test_displays_and_views_are_listed() -> None:
     assert {ACES, PLAIN, "Raw"} <= set(displays()[SRGB])
-    assert resolve_view("Display P3 - Display", None)[1] in displays()["Display P3 - Display"]
-    assert display_space(None, None) == SRGB
+    assert display_transform("Display P3 - Display").view in displays()["Display P3 - Display"]
+    assert display_transform().encoding == SRGB
 
 
 def test_what_the_config_lacks_is_refused_with_what_it_has() -> None:
@@ -116,8 +121,9 @@ def test_what_the_config_lacks_is_refused_with_what_it_has() -> None:
 
 def in_a_process_with(config: Path) -> subprocess.CompletedProcess[str]:
     code = (
-        "import numpy as np; from defshade_cli.image.colour import displays, to_display\n"
-        "print(displays(), to_display(np.full((1, 1, 3), 0.25, np.float32)).round(3).ravel().tolist())"
+        "import numpy as np; from defshade_cli.image.ocio import displays\n"
+        "from defshade_cli.image.colour import display_transform\n"
+        "print(displays(), display_transform().apply(np.full((1, 1, 3), 0.25, np.float32)).round(3).ravel().tolist())"
     )
     environment = os.environ | {"OCIO": str(config)}
     return subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
@@ -135,14 +141,14 @@ def test_a_config_that_is_missing_is_told(tmp_path: Path) -> None:
 
 def test_pictures_are_in_range_whatever_the_layer() -> None:
     for name, values in film().layers.items():
-        shown = picture(LAYERS[name], values, alpha=True)
+        shown = picture(LAYERS[name], values, display_transform(), alpha=True)
         assert shown.shape == values.shape
         assert np.isfinite(shown).all() and shown.min() >= 0 and shown.max() <= 1
 
 
 def test_lengths_are_stretched_from_white_at_the_nearest() -> None:
     depth = np.array([[[2.0], [4.0], [6.0], [np.inf]]], np.float32)
-    np.testing.assert_allclose(picture(LAYERS["depth"], depth, alpha=True).ravel(), [1, 0.5, 0, 0])
+    np.testing.assert_allclose(picture(LAYERS["depth"], depth, display_transform(), alpha=True).ravel(), [1, 0.5, 0, 0])
     flat, empty = np.full((1, 2, 1), 3, np.float32), np.full((1, 2, 1), np.inf, np.float32)
-    assert picture(LAYERS["depth"], flat, alpha=True).ravel().tolist() == [1, 1]
-    assert picture(LAYERS["depth"], empty, alpha=True).ravel().tolist() == [0, 0]
+    assert picture(LAYERS["depth"], flat, display_transform(), alpha=True).ravel().tolist() == [1, 1]
+    assert picture(LAYERS["depth"], empty, display_transform(), alpha=True).ravel().tolist() == [0, 0]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from build import bulb, camera, drawable, quad, rotated, scene, sphere, sun
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.planes import PLANES, needed_planes
+from defshade_cli.gpu.planes import PLANES, named_planes, needed_planes
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.material import Material
@@ -112,8 +112,9 @@ def test_optional_planes_exist_only_when_needed() -> None:
     assert [p.name for p in needed_planes([PLASTIC])] == ["base", "normal"]
     glowing = replace(PLASTIC, emissive_color=(0.0, 1.0, 0.0))
     coated = replace(PLASTIC, clearcoat=1.0, ior=1.8)
-    assert [p.name for p in needed_planes([PLASTIC, glowing, coated])] == [p.name for p in PLANES]
-    assert [p.name for p in needed_planes([PLASTIC], ["emission"])] == ["base", "normal", "emission"]
+    lit = [p.name for p in PLANES if p.encodings["float"].read and p.name != "links"]
+    assert [p.name for p in needed_planes([PLASTIC, glowing, coated])] == lit
+    assert [p.name for p in named_planes(["emission", "depth", "base"])] == ["base", "emission"]
 
 
 @pytest.mark.parametrize("scale", [(1, 1, 1), (-1, 1, 1), (1, -2, 3), (-1, -1, -1)])

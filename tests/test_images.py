@@ -42,6 +42,7 @@ CASES: dict[str, tuple[str, float | None, RenderSettings]] = {
     "materials.rgba8": ("materials", None, replace(SETTINGS, layout="rgba8")),
     "purposes.guide": ("purposes", None, replace(SETTINGS, purposes=("default", "proxy", "guide"))),
     "subdivision.low": ("subdivision", None, replace(SETTINGS, complexity="low")),
+    "light_rect_texture.32": ("light_rect_texture", None, replace(SETTINGS, samples=32)),
     "showcase.8": ("showcase", None, replace(SETTINGS, samples=8)),
 }
 """Reference → stage, frame, settings."""

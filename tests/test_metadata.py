@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -85,8 +86,8 @@ def test_header_as_openexr_reads_it(exr: Path) -> None:
     assert header["screenWindowCenter"] == pytest.approx([-0.1, 0.025])
     np.testing.assert_allclose(header["worldToCamera"], world_to_camera(camera), rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(header["worldToNDC"], world_to_ndc(camera), rtol=1e-6, atol=1e-6)
-    assert (header["defshade/depth/unit"], header["defshade/depth/space"]) == ("scene units", "camera")
-    assert header["defshade/depth/background"] == float("inf")
+    depth = {"unit": "scene units", "space": "camera", "background": "inf", "antialiased": False}
+    assert json.loads(header["defshade/layers"])["depth"] == depth
     assert header["defshade/samples"] == 16
     assert all(len(name) <= 31 for name in header), "longer names close the file to readers before OpenEXR 2"
 

@@ -167,10 +167,6 @@ def test_purposes_of_a_stage_by_others(assets: Path, name: str) -> None:
         ('def TetMesh "x" {\n}', "prims of type TetMesh are not drawn"),
         ('def GenerativeProcedural "x" {\n}', "prims of type GenerativeProcedural are not drawn"),
         ('def Hologram "x" {\n}', "no schema defines the type Hologram"),
-        (
-            'def Xform "x" (prepend apiSchemas = ["GeomModelAPI"]) {\nuniform token model:drawMode = "cards"\n}',
-            "draw mode cards: the full geometry is drawn",
-        ),
     ],
 )
 def test_what_is_left_out_is_reported(text: str, reason: str) -> None:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from defshade_cli.passes.sampling import CENTRE, owen_sobol, samples
+from defshade_cli.passes.sampling import CENTRE, owen_sobol, owen_sobol_3d, samples
 
 
 def test_a_single_sample_is_the_centre() -> None:
@@ -19,6 +19,12 @@ def test_every_pattern_is_a_net(pattern: int, log_count: int) -> None:
     for k in range(log_count + 1):
         cells = np.floor(points * [2**k, 2 ** (log_count - k)]).astype(int)
         assert len(np.unique(cells, axis=0)) == len(points)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 7))
+def test_the_third_coordinate_is_stratified_too(pattern: int, log_count: int) -> None:
+    third = [owen_sobol_3d(i, pattern)[2] for i in range(2**log_count)]
+    assert sorted(np.floor(np.array(third) * 2**log_count)) == list(range(2**log_count))
 
 
 def test_patterns_are_independent() -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from build import at, beauty, bulb, camera, drawable, quad, rotated, scene, sphere, sun
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.passes.pipeline import Pipeline
+from defshade_cli.passes.sampling import owen_sobol_3d
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.emission import emitter_at, far_field
 from defshade_cli.scene.light import CylinderLight, DiskLight, DistantLight, Light, RectLight, SphereLight
@@ -156,7 +157,7 @@ def test_surface_points_average_to_the_far_field(light: Light, normalize: bool) 
     """
     light = replace(light, normalize=normalize)
     grid = (np.arange(64) + 0.5) / 64
-    emitters = [emitter_at(light, (u, v)) for u in grid for v in grid]
+    emitters = [emitter_at(light, (u, v, 0.5), np.array([0.0, 0.0, -9.0])) for u in grid for v in grid]
     intensity = np.array([e.intensity[0] for e in emitters])
     if light.kind == "sphere":
         mean = (intensity / 4).mean()  # the mean of max(cosθ, 0) over the sphere of directions
@@ -168,6 +169,54 @@ def test_surface_points_average_to_the_far_field(light: Light, normalize: bool) 
     assert mean == pytest.approx(far_field(light).intensity[0], rel=2e-3)
 
 
+@pytest.mark.parametrize("inside", [True, False])
+@pytest.mark.parametrize("distance", [1.1, 1.5, 4.0])
+def test_points_of_a_sphere_give_its_closed_form_wherever_it_is_seen_from(distance: float, inside: bool) -> None:
+    """E = π L (r/d)², r = 1, on a surface that faces it; the ball's points are drawn for what lies elsewhere."""
+    lamp = SphereLight(path="/l", world_from_light=rotated("x", 30.0), color=(1, 1, 1), radius=1.0)
+    here, elsewhere = np.array([0.0, distance, 0.0]), np.array([3.0, -1.0, 2.0])
+    irradiance = 0.0
+    for i in range(4096):
+        emitter = emitter_at(lamp, owen_sobol_3d(i, 5), elsewhere, inside=inside)
+        l = emitter.position - here  # noqa: E741
+        facing = (
+            1.0 if emitter.profile == "uniform" else max(float(-l @ emitter.facing) / float(np.linalg.norm(l)), 0.0)
+        )
+        irradiance += emitter.intensity[0] * facing * max(-l[1], 0.0) / float(np.linalg.norm(l)) ** 3 / 4096
+    assert irradiance == pytest.approx(math.pi / distance**2, rel=0.02 if distance < 1.2 else 3e-3)
+
+
+def test_a_ball_has_no_point_that_is_wasted() -> None:
+    lamp = SphereLight(path="/l", world_from_light=np.eye(4), color=(1, 1, 1), radius=0.7)
+    emitters = [emitter_at(lamp, owen_sobol_3d(i, 5), np.array([0.0, -5.0, 0.0])) for i in range(64)]
+    assert len({tuple(e.intensity) for e in emitters}) == 1
+    assert max(np.linalg.norm(e.position) for e in emitters) <= 0.7
+
+
+def test_geometry_within_a_sphere_light_keeps_its_points_on_the_surface() -> None:
+    lamp = replace(bulb(0, 0, 0.6), radius=0.5)
+    assert make_plan(scene([quad(5.0)], [lamp]), RenderSettings()).lights[0].is_empty
+    assert not make_plan(scene([quad(5.0)], [replace(lamp, radius=0.7)]), RenderSettings()).lights[0].is_empty
+    around = scene(
+        [quad(5.0, -5.0), quad(5.0, 5.0)], [replace(lamp, radius=0.7)]
+    )  # boxes around all, triangles far off
+    assert make_plan(around, RenderSettings()).lights[0].is_empty
+
+
+@pytest.mark.parametrize("slant", [(0.0, 0.0), (2.0, 0.0), (-1.5, 1.5)])
+def test_shadows_are_as_large_as_they_should_be(pipeline: Pipeline, slant: tuple[float, float]) -> None:
+    """Edges where they belong to a tenth of a texel: the area of a square's shadow, texels being 1 % of its side."""
+    lamp = bulb(*slant, 2.5)
+    of = scene([quad(5.0), quad(0.4, 0.5)], [replace(lamp, treat_as_point=True)], [WHITE], camera(5.0, 0.35))
+    hidden = render(pipeline, of, samples=32) < 0.5 * render(pipeline, of, samples=32, shadows=False)
+    x = 0.35 * 5.0 * ((np.arange(64) + 0.5) / 32 - 1)
+    scale = 2.5 / 2.0
+    centre = [w * (1 - scale) for w in slant]
+    inside = np.maximum(np.abs(x[None, :] - centre[0]), np.abs(-x[:, None] - centre[1])) < 0.4 * scale
+    occluder = np.maximum(np.abs(x[None, :]), np.abs(x[:, None])) < 0.4 * 5.0 / 4.5 + 0.06
+    np.testing.assert_array_equal(hidden[~occluder], inside[~occluder])
+
+
 def test_a_point_stays_a_point() -> None:
     lamp = replace(bulb(0, 0, 1), treat_as_point=True)
-    np.testing.assert_array_equal(emitter_at(lamp, (0.3, 0.8)).position, far_field(lamp).position)
+    np.testing.assert_array_equal(emitter_at(lamp, (0.3, 0.8, 0.1), np.zeros(3)).position, far_field(lamp).position)

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from defshade_cli.cli.types import Size
+from defshade_cli.cli.types import Crop, Size
 from defshade_cli.settings import Composition, OutputSettings, RenderJob, RenderSettings
 
 _NOT_OPTIONS = {"stage", "frames", "composition", "session_layers", "settings", "output", "patterns"}
@@ -44,5 +44,6 @@ def _typed(option: click.Option, value: Any) -> list[str]:
         return [option.opts[-1] if value else option.secondary_opts[-1]]
     if option.multiple:
         return [part for item in value for part in (option.opts[-1], str(item))]
-    separator = "x" if isinstance(option.type, Size) else ","
-    return [option.opts[-1], separator.join(map(str, value)) if isinstance(value, tuple) else str(value)]
+    if isinstance(option.type, Size | Crop):
+        return [option.opts[-1], option.type.text(value)]
+    return [option.opts[-1], ",".join(map(str, value)) if isinstance(value, tuple) else str(value)]

@@ -49,12 +49,13 @@ def _package_versions() -> Iterator[str]:
 
 def _colour_config() -> str:
     """Where the OCIO configuration is from, and what pictures are shown with by default."""
-    from defshade_cli.image.colour import displays, resolve_view
+    from defshade_cli.image.colour import display_transform
+    from defshade_cli.image.ocio import displays
 
     source = os.environ.get("OCIO", "OpenImageIO's built-in config")
     try:
-        display, view = resolve_view(None, None)
-        return f"{source}: {display} / {view} by default, {len(displays())} displays"
+        shown = display_transform()
+        return f"{source}: {shown.display} / {shown.view} by default, {len(displays())} displays"
     except UsageError as error:
         return f"{source}: {error}"
 

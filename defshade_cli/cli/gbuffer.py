@@ -6,10 +6,9 @@ import click
 
 from defshade_cli.cli.options import HeadedCommand, Reporting, epilog, takes_job
 from defshade_cli.cli.render import execute
-from defshade_cli.image.layers import LAYERS
 from defshade_cli.settings import RenderJob
 
-_DATA_LAYERS = tuple(name for name, layer in LAYERS.items() if not layer.filtered)
+_LAYERS = ("depth", "distance", "position", "normal", "albedo", "metallic", "roughness", "emission")
 _EPILOG = epilog(
     "defshade gbuffer scene.usda",
     "defshade gbuffer scene.usda --layers depth,normal --width 640 -o training.exr",
@@ -19,10 +18,10 @@ _EPILOG = epilog(
 
 
 @click.command(cls=HeadedCommand, epilog=_EPILOG)
-@takes_job(layers=_DATA_LAYERS, name="{scene}.gbuffer")
+@takes_job(layers=_LAYERS, name="{scene}.gbuffer")
 def gbuffer(job: RenderJob, reporting: Reporting) -> None:
     """Write depth, normals and materials of SCENE.
 
-    All data layers, unlit, one sample at each pixel's centre, in one EXR. The same as render with other defaults.
+    Unlit, one sample at each pixel's centre, in one EXR. The same as render with other defaults.
     """
     execute(job, reporting)

@@ -104,8 +104,8 @@ def _camera_lines(scene: Scene) -> list[str]:
 
 def _lights(scene: Scene, plan: Plan) -> list[tuple[Light, str | None, float]]:
     """Every light with its volume and reach; None and 0 for one that gives no light and is not drawn."""
-    planned = {id(p.light): (p.volume, p.reach) for p in plan.lights}
-    return [(light, *planned.get(id(light), (None, 0.0))) for light in scene.lights]
+    planned = {p.number: (p.volume, p.reach) for p in plan.lights}
+    return [(light, *planned.get(number, (None, 0.0))) for number, light in enumerate(scene.lights)]
 
 
 def _light_line(light: Light, volume: str | None, reach: float) -> str:

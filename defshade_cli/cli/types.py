@@ -13,6 +13,9 @@ import click
 from defshade_cli.errors import UsageError
 from defshade_cli.settings import VariantChoice
 
+Region = tuple[int, int, int, int]
+"""(x, y, width, height) in pixels."""
+
 
 class Size(click.ParamType):
     """`1920x1080` → (1920, 1080)."""
@@ -24,6 +27,26 @@ class Size(click.ParamType):
         if not match:
             self.fail(f"{value!r} is not a size in pixels such as 1920x1080", param, ctx)
         return int(match[1]), int(match[2])
+
+    def text(self, value: tuple[int, int]) -> str:
+        return f"{value[0]}x{value[1]}"
+
+
+class Crop(click.ParamType):
+    """`640x360+100-20` → (100, -20, 640, 360), as oiiotool writes regions."""
+
+    name = "WxH+X+Y"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Region:
+        match = re.fullmatch(r"([1-9]\d*)x([1-9]\d*)([+-]\d+)([+-]\d+)", value)
+        if not match:
+            self.fail(f"{value!r} is not a part of the image such as 640x360+100+50", param, ctx)
+        width, height, x, y = map(int, match.groups())
+        return x, y, width, height
+
+    def text(self, value: Region) -> str:
+        x, y, width, height = value
+        return f"{width}x{height}{x:+d}{y:+d}"
 
 
 class Finite(click.ParamType):
@@ -97,6 +120,21 @@ class Names(click.ParamType):
             if name not in self.choices:
                 self.fail(f"unknown {self.noun} {name!r}; {_suggestion(name, self.choices)}", param, ctx)
         return tuple(dict.fromkeys(names))
+
+
+class Layers(click.ParamType):
+    """Names of layers, ours or another renderer's, separated by commas → ours; `all` for every one of the table."""
+
+    name = "a,b,c"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
+        from defshade_cli.image.layers import resolve
+
+        names = [name.strip() for name in value.split(",")] if isinstance(value, str) else value
+        try:
+            return resolve(names)
+        except UsageError as error:
+            self.fail(str(error), param, ctx)
 
 
 class Variant(click.ParamType):

@@ -7,10 +7,11 @@ from pathlib import Path
 
 from defshade_cli.errors import OutputError, UsageError
 from defshade_cli.farm.names import expand, has_frame_token
-from defshade_cli.image.colour import resolve_view
+from defshade_cli.image.colour import display_transform
 from defshade_cli.image.encoders import EXR, check_format, suffix_of
 from defshade_cli.image.files import check_writable, remove_abandoned, targets
 from defshade_cli.image.reading import read_header
+from defshade_cli.image.render_space import RenderSpace
 from defshade_cli.settings import RenderJob
 
 Frames = Sequence[float | None]
@@ -46,7 +47,8 @@ def check_outputs(job: RenderJob, frames: Frames, camera: str) -> None:
     for file in files:
         check_format(file, job.output)
     if any(suffix_of(file) != EXR for file in files):
-        resolve_view(job.output.display, job.output.view)
+        space = RenderSpace(config=job.settings.ocio)
+        display_transform(job.output.display, job.output.view, job.output.look, space)
     for folder_file in {file.parent: file for file in files}.values():
         check_writable(folder_file)
 

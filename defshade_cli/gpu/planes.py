@@ -1,7 +1,8 @@
 """The GBuffer's planes: one table of name, format, encoding and need; GLSL on both sides is generated from it.
 
 `rgba8` is the seed's layout bit for bit, `packed` spends the same bytes better, `float` keeps everything.
-The planes behind the first two exist only when a material or a requested layer needs them.
+The planes behind the first two exist only when a material or a requested layer needs them; the last ones, which the
+lighting does not read, only for layers.
 """
 
 from __future__ import annotations
@@ -12,13 +13,17 @@ from dataclasses import dataclass
 from defshade_cli.scene.material import Material
 from defshade_cli.settings import Layout
 
+MOST_TARGETS = 8
+"""Colour attachments that every OpenGL 4.5 has."""
+
 
 @dataclass(frozen=True, slots=True)
 class Encoding:
     """One plane in one layout.
 
     dtype: moderngl's, f1 for 8-bit unorm, f2 half, f4 float.
-    write: GLSL value from `Surface s`; read: GLSL statements that set members of `s` from `vec4 t`.
+    write: GLSL value from `Surface s` and `Detail d`.
+    read: GLSL statements that set members of `s` from `vec4 t`; empty for what the lighting does not read.
     """
 
     dtype: str
@@ -28,12 +33,17 @@ class Encoding:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plane:
-    """One render target. needed: does this material make it necessary?"""
+    """One render target.
+
+    needed: does this material make it necessary for the lighting?
+    inputs: what the GBuffer's shaders must interpolate for it, as defines.
+    """
 
     name: str
     components: int
     encodings: dict[Layout, Encoding]
     needed: Callable[[Material], bool]
+    inputs: tuple[str, ...] = ()
 
     @property
     def define(self) -> str:
@@ -51,6 +61,11 @@ def _encodings(write: str, read: str, narrow: str = "f1", wide: str = "f4") -> d
 
 def _always(_: Material) -> bool:
     return True
+
+
+def _detail(name: str, components: int, write: str, *inputs: str) -> Plane:
+    """A plane that only layers show."""
+    return Plane(name, components, _encodings(write, "", narrow="f4"), lambda _: False, inputs)
 
 
 _BASE_READ = "s.metallic = t.a;"
@@ -114,28 +129,47 @@ PLANES: tuple[Plane, ...] = (
         ),
         lambda material: material.clearcoat > 0.0 or "clearcoat" in material.inputs,
     ),
+    Plane(
+        "links",  # whether it is needed is the lights' affair
+        1,
+        _encodings("vec4(float(s.link_set))", "s.link_set = uint(t.r);", narrow="f4"),
+        lambda _: False,
+    ),
+    _detail("facet", 4, "vec4(d.facet, 0.0)", "POSITION"),
+    _detail("tangent", 4, "vec4(d.tangent, 0.0)", "POSITION", "LAYER_UV"),
+    _detail("uv", 2, "vec4(d.uv, 0.0, 0.0)", "LAYER_UV"),
+    _detail("occlusion", 1, "vec4(d.occlusion)"),
 )
 
 
-def needed_planes(materials: Iterable[Material], layers: Iterable[str] = ()) -> tuple[Plane, ...]:
-    """The planes that some material needs, or that a layer of the same name asks for, in the table's order."""
-    materials, names = list(materials), set(layers)
-    return tuple(p for p in PLANES if p.name in names or any(p.needed(m) for m in materials))
+def needed_planes(materials: Iterable[Material]) -> tuple[Plane, ...]:
+    """The planes without which the lighting cannot see some material, in the table's order."""
+    materials = list(materials)
+    return tuple(p for p in PLANES if any(p.needed(m) for m in materials))
+
+
+def named_planes(names: Iterable[str]) -> tuple[Plane, ...]:
+    """The planes of these names, in the table's order; names of other things are passed over."""
+    wanted = set(names)
+    return tuple(p for p in PLANES if p.name in wanted)
 
 
 def write_source(planes: Sequence[Plane], layout: Layout) -> str:
-    """GLSL: the outputs, and `void write_planes(Surface s)`."""
+    """GLSL: the outputs, and `void write_planes(Surface s, Detail d)`."""
     outputs = [f"layout(location = {i}) out vec4 plane_{p.name};" for i, p in enumerate(planes)]
     body = [f"    plane_{p.name} = {p.encodings[layout].write};" for p in planes]
-    return "\n".join(['#include "lib/encode.glsl"', *outputs, "", "void write_planes(Surface s) {", *body, "}"])
+    return "\n".join(
+        ['#include "lib/encode.glsl"', *outputs, "", "void write_planes(Surface s, Detail d) {", *body, "}"]
+    )
 
 
 def read_source(planes: Sequence[Plane], layout: Layout) -> str:
     """GLSL: the samplers, `BACKGROUND_DEPTH`, and `Surface read_planes(ivec2 pixel)`."""
-    samplers = [f"uniform sampler2D plane_{name};" for name in ("depth", *(p.name for p in planes))]
-    body = [f"    t = texelFetch(plane_{p.name}, pixel, 0); {p.encodings[layout].read}" for p in planes]
-    base = next(i for i, p in enumerate(planes) if p.name == "base")
-    body.insert(base + 1, "    set_metallic_fresnel(s, DEFAULT_F0);")
+    read = {p.name: p.encodings[layout].read for p in planes if p.encodings[layout].read}
+    samplers = [f"uniform sampler2D plane_{name};" for name in ("depth", *read)]
+    body = [f"    t = texelFetch(plane_{name}, pixel, 0); {statements}" for name, statements in read.items()]
+    if "base" in read:
+        body.insert(list(read).index("base") + 1, "    set_metallic_fresnel(s, DEFAULT_F0);")
     return "\n".join(
         [
             '#include "lib/encode.glsl"',

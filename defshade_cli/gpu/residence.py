@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.records import record
 from defshade_cli.gpu.textures import TextureSet, TextureStore, input_records
-from defshade_cli.gpu.vertices import UvNames, uv_names, vertex_arrays
+from defshade_cli.gpu.vertices import uv_names, vertex_arrays
 from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 
-VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS, TEXTURE_INPUTS, TILES = range(7)
+VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS, TEXTURE_INPUTS, TILES, LINKS = range(8)
 """Binding points of the storage buffers, as the shaders declare them."""
 
 _COMMAND = np.dtype([(name, "u4") for name in ("count", "instances", "first_index", "base_vertex", "base_instance")])
@@ -62,6 +62,10 @@ class DrawList:
     color_varies: bool
     textures: TextureSet
 
+    def vertices_of(self, program: moderngl.Program) -> list[tuple]:
+        """Those of `vertices` that the program reads."""
+        return [part for part in self.vertices if any(name in program for name in part[2:])]
+
     @property
     def texture_groups(self) -> int:
         """Samplers that a program needs for the textures; 0 where there are none."""
@@ -79,27 +83,32 @@ class GpuScene:
         self._tiles = RecordBuffer(gpu, TILES)
         self._textures = TextureStore(gpu)
         self._meshes: tuple[Mesh, ...] | None = None
-        self._uv_names: tuple[UvNames, ...] = ()
+        self._made_for: tuple = ()
         self._pool: list[moderngl.Buffer] = []
         self._draws: list[moderngl.Buffer] = []
 
-    def update(self, scene: Scene) -> DrawList:
-        """Make the scene's geometry, placements and materials resident, relative to its camera."""
+    def update(self, scene: Scene, *, layer_uv: bool = False) -> DrawList:
+        """Make the scene's geometry, placements and materials resident, relative to its camera.
+
+        layer_uv: texture coordinates for the layers too, whatever the materials read.
+        """
         self._instances.write(instance_records(scene.drawables, scene.camera.position))
         textures = self._update_materials(scene)
         color_varies = any(m.display_color is not None or m.display_opacity is not None for m in scene.meshes)
         textured = bool(textures.arrays)
         uvs = uv_names(scene.drawables, scene.materials, len(scene.meshes)) if textured else ()
-        if self._meshes is None or not _same(self._meshes, scene.meshes) or uvs != self._uv_names:
-            arrays = vertex_arrays(scene.meshes, uvs, color_varies=color_varies, textured=textured)
+        made_for = (uvs, color_varies, textured, layer_uv)
+        if self._meshes is None or not _same(self._meshes, scene.meshes) or made_for != self._made_for:
+            arrays = vertex_arrays(scene.meshes, uvs, color_varies=color_varies, textured=textured, layer_uv=layer_uv)
             self._pool = self._replaced(self._pool, arrays)
-            self._meshes, self._uv_names = scene.meshes, uvs
+            self._meshes, self._made_for = scene.meshes, made_for
         commands, rows = draw_commands(scene.drawables, scene.meshes)
         self._draws = self._replaced(self._draws, [commands, rows])
         positions, normals, indices, *varying = self._pool
         vertices = [(positions, "3f", "position_object"), (normals, "3f", "normal_object")]
-        names = ["vertex_color"] * color_varies + ["vertex_uv"] * textured
-        vertices += [(buffer, "4f", name) for buffer, name in zip(varying, names, strict=True)]
+        names = [("4f", "vertex_color")] * color_varies + [("4f", "vertex_uv")] * textured
+        names += [("2f", "vertex_layer_uv")] * layer_uv
+        vertices += [(buffer, *name) for buffer, name in zip(varying, names, strict=True)]
         vertices.append((self._draws[1], "2u4/i", "draw"))
         corners = command_corners(scene)
         return DrawList(
@@ -133,6 +142,7 @@ def instance_records(drawables: Sequence[Drawable], eye: NDArray[np.float64]) ->
     normal, handedness = _normal_matrices(matrices[:, :3, :3])
     records["relative_from_normal"][:, :3, :3] = normal.transpose(0, 2, 1)
     records["handedness"] = handedness
+    records["link_set"] = np.concatenate([d.link_sets for d in drawables])
     records["display_color"] = np.concatenate([d.display_color for d in drawables])
     records["display_opacity"] = np.concatenate([d.display_opacity for d in drawables])
     return records

@@ -24,7 +24,7 @@ def uv_names(drawables: Sequence[Drawable], materials: Sequence[Material], count
 
 
 def vertex_arrays(
-    meshes: Sequence[Mesh], uvs: Sequence[UvNames], *, color_varies: bool, textured: bool
+    meshes: Sequence[Mesh], uvs: Sequence[UvNames], *, color_varies: bool, textured: bool, layer_uv: bool = False
 ) -> list[NDArray]:
     """Positions, normals and indices; colours a vertex and texture coordinates where they are asked for."""
     arrays = [
@@ -36,6 +36,8 @@ def vertex_arrays(
         arrays.append(_joined([_vertex_colors(m) for m in meshes], 4))
     if textured:
         arrays.append(_joined([_vertex_uvs(m, names) for m, names in zip(meshes, uvs, strict=True)], 2 * UV_SETS))
+    if layer_uv:
+        arrays.append(_joined([_layer_uvs(m) for m in meshes], 2))
     return arrays
 
 
@@ -61,3 +63,9 @@ def _vertex_uvs(mesh: Mesh, names: UvNames) -> NDArray[np.float32]:
         if name in mesh.uvs:
             uvs[:, 2 * number : 2 * number + 2] = mesh.uvs[name]
     return uvs
+
+
+def _layer_uvs(mesh: Mesh) -> NDArray[np.float32]:
+    """(V, 2) the primvar st, else the first set that there is, else 0."""
+    sets = [mesh.uvs[name] for name in ("st", *mesh.uvs) if name in mesh.uvs]
+    return sets[0] if sets else np.zeros((len(mesh.points), 2), np.float32)

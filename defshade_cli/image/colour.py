@@ -1,13 +1,13 @@
 """Scene-linear pixels → a display, by OpenColorIO inside OpenImageIO.
 
-The config is $OCIO's, else OpenImageIO's built-in ACES one. Pixels are linear Rec.709/D65 with premultiplied alpha.
-Without a choice the config's default display and its default view hold: with the built-in config sRGB, tone mapped by
-ACES 2.0. `Un-tone-mapped` is the plain sRGB curve, and the cheaper one.
+Pixels are in the render space with premultiplied alpha. Without a choice the config's default display and its default
+view hold: with the built-in config sRGB, tone mapped by ACES 2.0. `Un-tone-mapped` is the plain sRGB curve, and the
+cheaper one.
 """
 
 from __future__ import annotations
 
-from functools import cache
+from dataclasses import dataclass
 
 import numpy as np
 import OpenImageIO as oiio
@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from defshade_cli.errors import UsageError
 from defshade_cli.image.layers import SCENE_UNITS, UNIT_VECTOR, Layer
-
-RENDER_SPACE = "lin_rec709_scene"
-"""Color interop ID of the render space: linear, Rec.709 primaries, D65 white."""
+from defshade_cli.image.ocio import displays, open_config
+from defshade_cli.image.render_space import REC709, RenderSpace
 
 BRIGHTEST = 65504.0
 """Half's largest number: what brighter light is clamped to, in half files and before a display transform."""
@@ -25,55 +24,71 @@ BRIGHTEST = 65504.0
 Pixels = NDArray[np.float32]
 
 
-def displays() -> dict[str, tuple[str, ...]]:
-    """The config's displays, each with its views."""
-    config = _config()
-    return {display: tuple(config.getViewNames(display)) for display in config.getDisplayNames()}
+@dataclass(frozen=True, slots=True)
+class DisplayTransform:
+    """A view of a display, and perhaps a look before it. space: what the pixels are in; its config knows the others."""
+
+    display: str
+    view: str
+    look: str
+    space: RenderSpace
+
+    @property
+    def encoding(self) -> str:
+        """The colour space that pixels arrive in, for a file's header."""
+        return open_config(self.space.config).getDisplayViewColorSpaceName(self.display, self.view)
+
+    def apply(self, pixels: Pixels, *, straight: bool = False) -> Pixels:
+        """Scene-linear (H, W, 3 or 4), exposure applied → the same shape in [0, 1], encoded for the display.
+
+        The transform sees colours that are not premultiplied by alpha: it is no linear function, so a half covered
+        pixel would come out as a darker colour. Afterwards they are premultiplied again unless `straight`. NaN
+        becomes 0. Raises UsageError for a space that the config cannot show.
+        """
+        buffer = oiio.ImageBuf(_finite(np.ascontiguousarray(pixels, np.float32)))
+        has_alpha = pixels.shape[-1] == 4
+        if has_alpha:
+            oiio.ImageBufAlgo.unpremult(buffer, buffer)
+        self._show(buffer)
+        if has_alpha and not straight:
+            oiio.ImageBufAlgo.premult(buffer, buffer)
+        if buffer.has_error:
+            raise UsageError(
+                f"view '{self.view}' of display '{self.display}' cannot show {self.space.name}: {buffer.geterror()}"
+            )
+        shown = np.asarray(buffer.get_pixels(oiio.FLOAT))
+        return np.clip(shown, 0.0, 1.0, out=shown)
+
+    def _show(self, buffer: oiio.ImageBuf) -> None:
+        oiio.ImageBufAlgo.ociodisplay(
+            buffer,
+            buffer,
+            self.display,
+            self.view,
+            self.space.name,
+            self.look,
+            unpremult=False,
+            colorconfig=self.space.config,
+        )
 
 
-def resolve_view(display: str | None, view: str | None) -> tuple[str, str]:
-    """(display, view) with the config's defaults filled in. Raises UsageError for one that the config lacks."""
-    config, valid = _config(), displays()
+def display_transform(
+    display: str | None = None, view: str | None = None, look: str | None = None, space: RenderSpace = REC709
+) -> DisplayTransform:
+    """The config's defaults where nothing is chosen. Raises UsageError for a choice that the config lacks."""
+    config, valid = open_config(space.config), displays(space.config)
     display = display or config.getDefaultDisplayName()
     if display not in valid:
         raise UsageError(f"there is no display '{display}'; the OCIO config has {', '.join(valid)}")
     view = view or config.getDefaultViewName(display)
     if view not in valid[display]:
         raise UsageError(f"display '{display}' has no view '{view}'; it has {', '.join(valid[display])}")
-    return display, view
+    if look and look not in config.getLookNames():
+        raise UsageError(f"there is no look '{look}'; the OCIO config has {', '.join(config.getLookNames()) or 'none'}")
+    return DisplayTransform(display, view, look or "", space)
 
 
-def display_space(display: str | None, view: str | None) -> str:
-    """The colour space that `to_display` arrives in, for a file's header."""
-    return _config().getDisplayViewColorSpaceName(*resolve_view(display, view))
-
-
-def to_display(
-    pixels: Pixels, *, display: str | None = None, view: str | None = None, straight: bool = False
-) -> Pixels:
-    """Scene-linear (H, W, 3 or 4), exposure applied → the same shape in [0, 1], encoded for the display.
-
-    The transform sees colours that are not premultiplied by alpha: it is no linear function, so a half covered pixel
-    would come out as a darker colour. Afterwards they are premultiplied again unless `straight`. NaN becomes 0.
-    Raises UsageError for a display or view that the config lacks.
-    """
-    display, view = resolve_view(display, view)
-    buffer = oiio.ImageBuf(_finite(np.ascontiguousarray(pixels, np.float32)))
-    has_alpha = pixels.shape[-1] == 4
-    if has_alpha:
-        oiio.ImageBufAlgo.unpremult(buffer, buffer)
-    oiio.ImageBufAlgo.ociodisplay(buffer, buffer, display, view, RENDER_SPACE, unpremult=False)
-    if has_alpha and not straight:
-        oiio.ImageBufAlgo.premult(buffer, buffer)
-    if buffer.has_error:
-        raise UsageError(f"view '{view}' of display '{display}' cannot show {RENDER_SPACE}: {buffer.geterror()}")
-    shown = np.asarray(buffer.get_pixels(oiio.FLOAT))
-    return np.clip(shown, 0.0, 1.0, out=shown)
-
-
-def picture(
-    layer: Layer, pixels: Pixels, *, alpha: bool, display: str | None = None, view: str | None = None
-) -> Pixels:
+def picture(layer: Layer, pixels: Pixels, transform: DisplayTransform, *, alpha: bool) -> Pixels:
     """A layer in [0, 1] to look at, (H, W, 1, 3 or 4).
 
     Colours go through the display transform: with straight alpha where `alpha` keeps it, else composited on black.
@@ -81,21 +96,12 @@ def picture(
     0..1 stays. Only EXR holds the data themselves.
     """
     if layer.is_color:
-        shown = pixels if alpha else pixels[..., :3]
-        return to_display(shown, display=display, view=view, straight=True)
+        return transform.apply(pixels if alpha else pixels[..., :3], straight=True)
     if layer.unit == UNIT_VECTOR:
         return np.clip(0.5 * pixels + 0.5, 0.0, 1.0)
     if layer.unit == SCENE_UNITS:
         return _stretched(pixels)
     return np.clip(pixels, 0.0, 1.0)
-
-
-@cache
-def _config() -> oiio.ColorConfig:
-    config = oiio.ColorConfig()
-    if reason := config.geterror():
-        raise UsageError(f"the OCIO config cannot be used: {reason}")
-    return config
 
 
 def _finite(pixels: Pixels) -> Pixels:

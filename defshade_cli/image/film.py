@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.scene.camera import Camera
 
 StopReason = Literal["samples", "max-error", "time-limit"]
@@ -40,6 +41,7 @@ class Film:
     layers: name → (height, width, channels) float32, first row at the top; channels as image.layers.LAYERS says.
     camera: conformed to the image's aspect.
     scene_name: the stage's file name without suffix; frame: time code, None for the default time.
+    render_space: of light and reflectance.
     samples: a pixel.
     origin: (x, y) of the first pixel in the display window, from its top left corner, y down.
     display: (width, height) of the display window that the camera fills; None where that is the layers' own size.
@@ -52,6 +54,7 @@ class Film:
     frame: float | None = None
     frames_per_second: float = 24.0
     samples: int = 1
+    render_space: RenderSpace = REC709
     origin: tuple[int, int] = (0, 0)
     display: tuple[int, int] | None = None
     metadata: dict[str, Any] = field(default_factory=dict)

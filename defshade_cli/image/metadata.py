@@ -4,7 +4,7 @@
     camera     worldToCamera, worldToNDC, screenWindowCenter, screenWindowWidth, pixelAspectRatio
     time       framesPerSecond, capDate, utcOffset
     people     owner (Film.metadata's), comments, Software
-    defshade/  scene, camera, frame, samples and all of Film.metadata; LAYER/unit, LAYER/space, LAYER/background
+    defshade/  scene, camera, frame, samples and all of Film.metadata; layers: what each one's numbers mean, as JSON
 
 Definitions: OpenEXR, "Standard Attributes". Matrices there act on row vectors, and its camera space is left-handed with
 +z into the picture: USD's with z mirrored.
@@ -22,14 +22,11 @@ import numpy as np
 
 from defshade_cli import __version__
 from defshade_cli.image.film import Film
-from defshade_cli.image.layers import LAYERS
+from defshade_cli.image.layers import LAYERS, Layer
 from defshade_cli.scene.camera import Camera
 from defshade_cli.spaces import Matrix
 
 PREFIX = "defshade/"
-
-REC709_D65 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-"""Chromaticities of red, green, blue and white: ITU-R BT.709-6."""
 
 
 class Attribute(NamedTuple):
@@ -42,18 +39,25 @@ class Attribute(NamedTuple):
 
 def exr_attributes(film: Film, layers: tuple[str, ...]) -> Iterator[Attribute]:
     """All that an EXR with these layers carries, its colour space and compression apart."""
-    if any(LAYERS[name].is_color for name in layers):
-        yield Attribute("chromaticities", "float[8]", REC709_D65)
+    chromaticities = film.render_space.chromaticities
+    if chromaticities and any(LAYERS[name].is_color for name in layers):
+        yield Attribute("chromaticities", "float[8]", chromaticities)
     yield from _camera(film)
     yield Attribute("FramesPerSecond", "rational", frame_rate(film.frames_per_second))
     yield from text_attributes(film)
     for name, value in provenance(film).items():
         yield _attribute(PREFIX + name, value)
-    for name in layers:
-        layer = LAYERS[name]
-        yield Attribute(f"{PREFIX}{name}/unit", "string", layer.unit)
-        yield Attribute(f"{PREFIX}{name}/space", "string", layer.space)
-        yield Attribute(f"{PREFIX}{name}/background", "float", layer.background)
+    yield Attribute(f"{PREFIX}layers", "string", json.dumps({name: _meaning(LAYERS[name]) for name in layers}))
+
+
+def _meaning(layer: Layer) -> dict[str, str | bool]:
+    """For people and JSON parsers alike: an infinite background is the word inf."""
+    return {
+        "unit": layer.unit,
+        "space": layer.space,
+        "background": f"{layer.background:g}",
+        "antialiased": layer.filtered,
+    }
 
 
 def text_attributes(film: Film) -> Iterator[Attribute]:

@@ -38,8 +38,9 @@ def layout_errors(
 ) -> dict[Layout, RelativeError]:
     """Each layout's beauty against the reference, which is evaluated on the float GBuffer."""
     plan = make_plan(scene, replace(settings, layout="float"))
+    lights = [planned.light for planned in plan.lights]
     reference, _ = reference_radiance(
-        pipeline.planes(scene, plan), plan.camera, scene.lights, shading=settings.shading, exposure=settings.exposure
+        pipeline.planes(scene, plan), plan.camera, lights, shading=settings.shading, exposure=settings.exposure
     )
 
     def error(layout: Layout) -> RelativeError:

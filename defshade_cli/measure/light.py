@@ -26,7 +26,27 @@ def irradiance_at(light: Light, positions: Array) -> tuple[Array, Array]:
     irradiance = light.intensity_on_axis * falloff[..., None]
     if light.shaping is not None:
         irradiance = irradiance * shaping_factor(light.shaping, light.axis, emitted)
+        irradiance = irradiance * ies_factor(light.shaping, light.frame, emitted)[..., None]
     return -emitted, irradiance
+
+
+def ies_factor(shaping: Shaping, frame: Array, emitted: Array) -> Array:
+    """(P,) factor of the IES profile on what leaves along unit vectors `emitted` (P, 3); 1 without a profile.
+
+    frame: (3, 3) unit X, Y and Z of the light in its columns. As in OpenUSD's own renderer, the angles are the polar
+    coordinates of the direction that light comes from: 0 vertical along the axis, 0 horizontal for light towards −X.
+    """
+    if shaping.ies is None:
+        return np.ones(emitted.shape[:-1])
+    x, y, z = np.moveaxis(-emitted @ frame, -1, 0)
+    vertical = np.degrees(np.arctan2(np.hypot(x, y), z))
+    scale = shaping.ies_angle_scale
+    if scale > 0.0:
+        vertical = vertical / scale
+    elif scale < 0.0:
+        vertical = (vertical - 180.0) / -scale + 180.0
+    factor = shaping.ies.at(np.clip(vertical, 0.0, 180.0), np.degrees(np.arctan2(y, x)))
+    return factor / shaping.ies.mean if shaping.ies_normalize else factor
 
 
 def shaping_factor(shaping: Shaping, axis: Array, emitted: Array) -> Array:

@@ -38,16 +38,25 @@ def reference_radiance(
     """
     surface, covered = surface_from_planes(planes, camera)
     radiance = np.zeros((*covered.shape, 3))
-    radiance[covered] = shade(surface, lights, shading=shading) * (camera.exposure * exposure_scale(exposure))
+    sets = planes["links"][covered, 0].astype(int) if "links" in planes else np.zeros(len(surface.base), int)
+    radiance[covered] = shade(surface, lights, sets, shading=shading) * (camera.exposure * exposure_scale(exposure))
     return radiance, covered
 
 
-def shade(surface: Surface, lights: Iterable[Light], *, shading: Shading = "preview-surface") -> Array:
-    """(P, 3) radiance towards the eye: emission plus every light's reflection, no shadows."""
+def shade(
+    surface: Surface, lights: Iterable[Light], link_sets: NDArray | None = None, *, shading: Shading = "preview-surface"
+) -> Array:
+    """(P, 3) radiance towards the eye: emission plus every light's reflection, no shadows.
+
+    link_sets: (P,) int, of what stands there; without them everything is linked.
+    """
     radiance = surface.emission.copy()
     for light in lights:
         direction, irradiance = irradiance_at(light, surface.position)
-        radiance += irradiance * evaluate_brdf(surface, direction, (light.diffuse, light.specular), shading=shading)
+        reflected = irradiance * evaluate_brdf(surface, direction, (light.diffuse, light.specular), shading=shading)
+        if light.links and link_sets is not None:
+            reflected = reflected * light.links.lights[link_sets][:, None]
+        radiance += reflected
     return radiance
 
 
@@ -56,7 +65,7 @@ def surface_from_planes(planes: Planes, camera: Camera) -> tuple[Surface, NDArra
 
     planes: (H, W, C) float32, row 0 at the top. "base": rgb and metallic; "normal": world xyz and roughness;
         "depth": planar camera z, +inf on the background; "emission", "specular" (F0) and "clearcoat" (amount
-        and roughness) where the stage has them.
+        and roughness) where the stage has them; "links": the link set.
     camera: conformed to the image's aspect.
     """
     depth = planes["depth"][..., 0].astype(np.float64)

@@ -15,7 +15,7 @@ from defshade_cli.passes.shadows import CAPACITY, ShadowExtent, shadow_cameras
 from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.emission import Emitter, emitter_at, far_field, sky_emitter
-from defshade_cli.scene.light import DomeLight, Light
+from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import Window
 
@@ -38,7 +38,7 @@ def light_batches(scene: Scene, plan: Plan, sample: Sample) -> Iterator[list[Lit
     batch: list[LitSample] = []
     used = 0
     for number, planned in enumerate(plan.lights):
-        for emitter in _emitters(number, planned.light, plan, sample):
+        for emitter in _emitters(number, planned, plan, sample, extent):
             lit = _lit_sample(planned, emitter, plan, extent)
             if used + len(lit.shadow_cameras) > CAPACITY:
                 yield batch
@@ -49,16 +49,19 @@ def light_batches(scene: Scene, plan: Plan, sample: Sample) -> Iterator[list[Lit
         yield batch
 
 
-def _emitters(number: int, light: Light, plan: Plan, sample: Sample) -> list[Emitter]:
+def _emitters(number: int, planned: PlannedLight, plan: Plan, sample: Sample, extent: ShadowExtent) -> list[Emitter]:
     """One for most lights; some directions for a dome, and none where its analytic term stands in for them."""
+    light = planned.light
     if isinstance(light, DomeLight):
         if plan.samples == 1:
             return []
         places = (sample.on_light(number, k, DOME_DIRECTIONS) for k in range(DOME_DIRECTIONS))
-        return [sky_emitter(light, sky_of(light), u, 1.0 / DOME_DIRECTIONS) for u in places]
+        return [sky_emitter(light, sky_of(light), u[:2], 1.0 / DOME_DIRECTIONS) for u in places]
     if plan.samples == 1:
         return [far_field(light)]
-    return [emitter_at(light, sample.on_light(number)).shared_by(plan.samples)]
+    towards = extent.receivers.mean(axis=0) + plan.camera.position
+    emitter = emitter_at(light, sample.on_light(number), towards, inside=planned.is_empty)
+    return [emitter.shared_by(plan.samples)]
 
 
 def shadow_extent(bounds: NDArray[np.float64], plan: Plan) -> ShadowExtent:

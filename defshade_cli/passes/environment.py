@@ -13,9 +13,12 @@ import numpy as np
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import Plane, read_source
+from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.targets import Target
 from defshade_cli.image.environment import sky_of
+from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.gbuffer import GBuffer
+from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.screen import Screen
 from defshade_cli.plan import Plan
 from defshade_cli.scene.environment import Environment
@@ -35,16 +38,17 @@ class EnvironmentVariant:
     orthographic: bool
     analytic: bool
     background: bool
+    space: RenderSpace = REC709
 
     @classmethod
     def of(cls, plan: Plan) -> EnvironmentVariant:
         orthographic = plan.camera.projection == "orthographic"
-        return cls(plan.planes, plan.layout, orthographic, plan.samples == 1, plan.background)
+        return cls(plan.planes, plan.layout, orthographic, plan.samples == 1, plan.background, plan.render_space)
 
     @property
     def defines(self) -> list[str]:
         flags = ["ORTHOGRAPHIC"] * self.orthographic + ["ANALYTIC"] * self.analytic + ["BACKGROUND"] * self.background
-        return [plane.define for plane in self.planes] + flags
+        return [plane.define for plane in self.planes] + flags + space_defines(self.space)
 
 
 class EnvironmentPass:
@@ -58,14 +62,14 @@ class EnvironmentPass:
         self._screen, self._array = screen, screen.array(self._program)
         self._skies: dict[Environment, moderngl.Texture] = {}
 
-    def draw(self, dome: DomeLight, gbuffer: GBuffer, radiance: Target) -> None:
-        """Add the dome to `radiance`."""
+    def draw(self, dome: DomeLight, gbuffer: GBuffer, radiance: Target, first_link: int = ALL_LINKED) -> None:
+        """Add the dome to `radiance`. first_link: place of its bits, which are bound."""
         radiance.framebuffer.use()
         self._gpu.context.enable_only(moderngl.BLEND)
         self._gpu.context.blend_func = moderngl.ONE, moderngl.ONE
         sky = sky_of(dome)
         gbuffer.bind(self._program, sky=self._texture(sky))
-        for name, value in _uniforms(dome, sky).items():
+        for name, value in {**_uniforms(dome, sky), "first_link": first_link}.items():
             if name in self._program:
                 self._program[name] = value
         self._screen.draw(self._array)

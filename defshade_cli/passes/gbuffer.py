@@ -8,9 +8,11 @@ import moderngl
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import Plane, uses_standard_depth, write_source
+from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.residence import DrawList
 from defshade_cli.gpu.targets import Target, allocate
 from defshade_cli.gpu.textures import textures_source
+from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.screen import TileMask
 from defshade_cli.settings import Layout
 
@@ -23,7 +25,7 @@ class GBuffer:
     planes: tuple[Plane, ...]
     layout: Layout
 
-    def bind(self, program: moderngl.Program, **others: moderngl.Texture | None) -> None:
+    def bind(self, program: moderngl.Program, **others: moderngl.Texture | moderngl.TextureArray | None) -> None:
         """Let `program` read the planes, and `others` by the names of their samplers, where it has those."""
         textures = {f"plane_{name}": texture for name, texture in self.target.textures.items()}
         bound = {**textures, "plane_depth": self.target.depth, **others}
@@ -51,12 +53,14 @@ class GBufferVariant:
     cutout: bool
     color_varies: bool
     texture_groups: int = 0
+    space: RenderSpace = REC709
 
     @property
     def defines(self) -> list[str]:
         flags = ["CUTOUT"] * self.cutout + ["DISPLAY_COLOR_VARIES"] * self.color_varies
-        flags += ["TEXTURES"] * bool(self.texture_groups)
-        return [plane.define for plane in self.planes] + flags
+        flags += ["TEXTURES", "POSITION"] * bool(self.texture_groups)
+        inputs = [name for plane in self.planes for name in plane.inputs]
+        return list(dict.fromkeys([plane.define for plane in self.planes] + flags + inputs)) + space_defines(self.space)
 
 
 class GBufferPass:
@@ -84,7 +88,7 @@ class GBufferPass:
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = "<" if standard else ">"
         draws.textures.bind(self._program)
-        vertex_array = self._context.vertex_array(self._program, list(draws.vertices), draws.indices)
+        vertex_array = self._context.vertex_array(self._program, draws.vertices_of(self._program), draws.indices)
         vertex_array.render_indirect(draws.commands)
         vertex_array.release()
         mask.fill(gbuffer.target, background)

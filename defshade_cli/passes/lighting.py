@@ -18,18 +18,24 @@ from numpy.typing import NDArray
 from defshade_cli.gpu.context import DEPTH_CLAMP, Gpu
 from defshade_cli.gpu.planes import Plane, read_source, uses_standard_depth
 from defshade_cli.gpu.records import record
+from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.targets import Target
+from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.gbuffer import GBuffer
+from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.screen import Screen
 from defshade_cli.passes.shadows import ShadowAtlas
+from defshade_cli.passes.tables import NO_TABLES, LightTables
 from defshade_cli.passes.volumes import cone_volume, sphere_volume
 from defshade_cli.plan import Plan, PlannedLight, Volume
 from defshade_cli.scene.emission import Emitter
-from defshade_cli.scene.light import Profile, Shaping
+from defshade_cli.scene.ies import IesProfile
+from defshade_cli.scene.light import Light, Profile, Shaping
 from defshade_cli.settings import Layout, Shading
 
 _PROFILES: tuple[Profile, ...] = ("uniform", "cosine", "sine")
 _NO_CONE = 2.0 * math.pi
+_NO_IES = 0xFFFFFFFF
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,17 +47,29 @@ class LightingVariant:
     shading: Shading
     orthographic: bool
     shadows: bool
+    ies: bool
     volumes: tuple[Volume, ...]
+    space: RenderSpace = REC709
 
     @classmethod
     def of(cls, plan: Plan) -> LightingVariant:
         orthographic = plan.camera.projection == "orthographic"
-        return cls(plan.planes, plan.layout, plan.shading, orthographic, plan.shadows, plan.volumes)
+        return cls(
+            plan.planes,
+            plan.layout,
+            plan.shading,
+            orthographic,
+            plan.shadows,
+            bool(plan.profiles),
+            plan.volumes,
+            plan.render_space,
+        )
 
     @property
     def defines(self) -> list[str]:
         flags = ["CLASSIC"] * (self.shading == "classic") + ["ORTHOGRAPHIC"] * self.orthographic
-        return [plane.define for plane in self.planes] + flags + ["SHADOWS"] * self.shadows
+        flags += ["SHADOWS"] * self.shadows + ["IES"] * self.ies + space_defines(self.space)
+        return [plane.define for plane in self.planes] + flags
 
 
 class LightingPass:
@@ -78,7 +96,12 @@ class LightingPass:
         self._screen.draw(self._emission)
 
     def add(
-        self, lights: Sequence[PlannedLight], gbuffer: GBuffer, radiance: Target, shadows: ShadowAtlas | None = None
+        self,
+        lights: Sequence[PlannedLight],
+        gbuffer: GBuffer,
+        radiance: Target,
+        shadows: ShadowAtlas | None = None,
+        tables: LightTables = NO_TABLES,
     ) -> None:
         """The volumes of `lights`, whose records are bound, on top of `radiance`."""
         radiance.framebuffer.use()
@@ -88,7 +111,8 @@ class LightingPass:
         self._context.depth_func = ">" if uses_standard_depth(gbuffer.layout) else "<"
         kinds = [planned.volume for planned in lights]
         for volume in dict.fromkeys(kinds):
-            gbuffer.bind(self._volumes[volume].program, shadow_atlas=shadows.depth if shadows else None)
+            maps = shadows.depth if shadows else None
+            gbuffer.bind(self._volumes[volume].program, shadow_atlas=maps, ies_tables=tables.candela)
             draw = self._draw_quads if volume == "quad" else self._draw_volumes
             draw(self._volumes[volume], kinds.index(volume), kinds.count(volume))
         self._context.disable_direct(DEPTH_CLAMP)
@@ -113,7 +137,11 @@ def _volume_array(gpu: Gpu, volume: Volume, program: moderngl.Program) -> modern
 
 
 def light_records(
-    lights: Sequence[PlannedLight], emitters: Sequence[Emitter], eye: NDArray[np.float64], shadows: ShadowAtlas | None
+    lights: Sequence[PlannedLight],
+    emitters: Sequence[Emitter],
+    eye: NDArray[np.float64],
+    shadows: ShadowAtlas | None,
+    tables: LightTables = NO_TABLES,
 ) -> NDArray:
     """One Light record each, positions relative to the eye."""
     records = np.zeros(len(lights), record("Light"))
@@ -125,6 +153,8 @@ def light_records(
         row["reach"], row["extent"] = planned.reach + aside, emitter.extent
         row["is_sky"] = planned.light.kind == "dome"
         _set_shaping(row, planned.light.shaping)
+        _set_profile(row, planned.light, tables.profiles)
+        row["first_link"] = tables.links.lights.get(planned.light, ALL_LINKED)
     if shadows:
         records["first_shadow"], records["shadow_count"] = shadows.first, shadows.count
     return records
@@ -137,3 +167,13 @@ def _set_shaping(row: np.void, shaping: Shaping | None) -> None:
     angle, softness = math.radians(shaping.cone_angle), min(max(shaping.cone_softness, 0.0), 1.0)
     row["cone_angle"], row["cone_smooth_start"] = angle, angle * (1.0 - softness)
     row["focus"], row["focus_tint"] = shaping.focus, shaping.focus_tint
+
+
+def _set_profile(row: np.void, light: Light, profiles: Sequence[IesProfile]) -> None:
+    shaping = light.shaping
+    if shaping is None or shaping.ies is None:
+        row["ies_table"] = _NO_IES
+        return
+    row["right"], row["up"] = light.frame[:, 0], light.frame[:, 1]
+    row["ies_table"], row["ies_scale"] = profiles.index(shaping.ies), shaping.ies_scale
+    row["ies_vertical"] = shaping.ies_vertical

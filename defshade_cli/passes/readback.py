@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.gpu.planes import uses_standard_depth
-from defshade_cli.image.layers import LAYERS
+from defshade_cli.gpu.planes import Plane, uses_standard_depth
+from defshade_cli.image.layers import LAYERS, Layer
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.view import camera_depth
 from defshade_cli.plan import Plan
 from defshade_cli.scene.camera import Camera
-from defshade_cli.spaces import transform_points
+from defshade_cli.spaces import transform_directions, transform_points
 
 Planes = dict[str, NDArray[np.float32]]
 
 
-def read_planes(gbuffer: GBuffer, plan: Plan) -> Planes:
+def read_planes(gbuffer: GBuffer, wanted: Iterable[Plane], plan: Plan) -> Planes:
     """(height, width, components) float32 a plane of a float GBuffer, and "depth": planar, +inf on the background."""
-    planes: Planes = {plane.name: gbuffer.target.read(plane.name) for plane in gbuffer.planes}
+    planes: Planes = {plane.name: gbuffer.target.read(plane.name) for plane in wanted}
     stored = gbuffer.target.read_depth()
     depth = camera_depth(plan.camera, plan.clip, uses_standard_depth(gbuffer.layout), stored)
     planes["depth"] = depth.astype(np.float32)[..., None]
@@ -29,28 +31,25 @@ def data_layers(planes: Planes, plan: Plan) -> dict[str, NDArray[np.float32]]:
     """The data layers that the plan asks for, background filled in."""
     covered = np.isfinite(planes["depth"])
     layers = {}
-    for name in plan.layers:
+    for name in plan.data_layers:
         layer = LAYERS[name]
-        if layer.source != "lighting":
-            values = _layer_values(name, planes, plan.camera)
-            layers[name] = np.where(covered, values, np.float32(layer.background)).astype(np.float32)
+        values = _layer_values(layer, planes, plan.camera)
+        layers[name] = np.where(covered, values, np.float32(layer.background)).astype(np.float32)
     return layers
 
 
-def _layer_values(name: str, planes: Planes, camera: Camera) -> NDArray:
-    match name:
-        case "depth":
-            return planes["depth"]
+def _layer_values(layer: Layer, planes: Planes, camera: Camera) -> NDArray:
+    match layer.name:
         case "distance":
             return np.linalg.norm(_camera_positions(planes["depth"], camera), axis=-1, keepdims=True)
         case "position":
             return transform_points(camera.world_from_camera, _camera_positions(planes["depth"], camera))
-        case "metallic":
-            return planes["base"][..., 3:]
-        case "roughness":
-            return planes["normal"][..., 3:]
+        case "Peye":
+            return _camera_positions(planes["depth"], camera)
+        case "Neye":
+            return transform_directions(camera.camera_from_world, planes["normal"][..., :3])
         case _:
-            return planes[LAYERS[name].source][..., :3]
+            return planes[layer.source][..., layer.first : layer.first + len(layer.channels)]
 
 
 def _camera_positions(depth: NDArray[np.float32], camera: Camera) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from defshade_cli.passes.filters import filter_offset
 from defshade_cli.settings import Filter
 
 Pair = tuple[float, float]
-
+Triple = tuple[float, float, float]
 
 _MASK = 0xFFFFFFFF
 _PIXEL, _TEXEL, _LENS, _LIGHTS = range(4)
@@ -36,9 +36,9 @@ class Sample:
         """From a texel's centre, in texels."""
         return self.texel[0] - 0.5, self.texel[1] - 0.5
 
-    def on_light(self, number: int, k: int = 0, of: int = 1) -> Pair:
-        """The k-th of some places on the number-th light."""
-        return owen_sobol(self.index * of + k, _LIGHTS + number)
+    def on_light(self, number: int, k: int = 0, of: int = 1) -> Triple:
+        """The k-th of some places on the number-th light; lights with a surface take the first two coordinates."""
+        return owen_sobol_3d(self.index * of + k, _LIGHTS + number)
 
 
 CENTRE = Sample(0, (0.5, 0.5), (0.5, 0.5), (0.5, 0.5))
@@ -57,19 +57,39 @@ def samples(count: int, kind: Filter = "box", width: float = 1.0) -> Iterator[Sa
 
 def owen_sobol(index: int, pattern: int) -> Pair:
     """Point `index` of one of 2^32 independent patterns, in [0, 1)²."""
+    return owen_sobol_3d(index, pattern)[:2]
+
+
+def owen_sobol_3d(index: int, pattern: int) -> Triple:
+    """The same in [0, 1)³; the first two coordinates are `owen_sobol`'s."""
     seed = _hash(pattern)
-    x, y = _sobol(_scrambled(index, seed))
-    return _scrambled(x, _hash(seed ^ 0x55555555)) / 2**32, _scrambled(y, _hash(seed ^ 0xAAAAAAAA)) / 2**32
+    x, y, z = _sobol(_scrambled(index, seed))
+    keys = (_hash(seed ^ constant) for constant in (0x55555555, 0xAAAAAAAA, 0x33333333))
+    a, b, c = (_scrambled(bits, key) / 2**32 for bits, key in zip((x, y, z), keys, strict=True))
+    return a, b, c
 
 
-def _sobol(index: int) -> tuple[int, int]:
-    """The first two dimensions of Sobol's sequence as 32-bit fractions."""
-    x, y, v, w = 0, 0, 1 << 31, 1 << 31
-    while index:
+def _sobol(index: int) -> tuple[int, int, int]:
+    """The first three dimensions of Sobol's sequence as 32-bit fractions."""
+    x = y = z = 0
+    for column in _COLUMNS:
+        if not index:
+            break
         if index & 1:
-            x, y = x ^ v, y ^ w
-        index, v, w = index >> 1, v >> 1, w ^ w >> 1
-    return x, y
+            x, y, z = x ^ column[0], y ^ column[1], z ^ column[2]
+        index >>= 1
+    return x, y, z
+
+
+def _columns() -> Iterator[tuple[int, int, int]]:
+    """Of the generating matrices: identity, Pascal's triangle, and the primitive polynomial x² + x + 1."""
+    x, y, z, after = 1 << 31, 1 << 31, 1 << 31, 3 << 30
+    for _ in range(32):
+        yield x, y, z
+        x, y, z, after = x >> 1, y ^ y >> 1, after, after ^ z ^ z >> 2
+
+
+_COLUMNS = tuple(_columns())
 
 
 def _scrambled(bits: int, seed: int) -> int:

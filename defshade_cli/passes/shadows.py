@@ -22,7 +22,7 @@ from defshade_cli.passes.view import clip_from_camera
 from defshade_cli.scene.camera import Camera, Projection
 from defshade_cli.scene.emission import Emitter
 from defshade_cli.scene.light import Shaping
-from defshade_cli.spaces import Matrix, Window, normalize, transform_points
+from defshade_cli.spaces import Matrix, Window, frame_along, transform_points
 
 RESOLUTION = 1024
 TILES = 4
@@ -32,6 +32,10 @@ CAPACITY = TILES * TILES
 _WIDEST_DEGREES = 60.0
 _NO_WINDOW: Window = (-1.0, 1.0, -1.0, 1.0)
 _NEAREST = 1e-4  # near plane over far plane, where nothing else bounds it
+_DEPTH_OFFSET = (-2.0, -1.0)
+"""Of what a map stores, in slopes a texel and in steps of depth: at the four texels around a receiver a flat surface is
+up to |∂z/∂x| + |∂z/∂y| nearer. An offset along the light moves no shadow's edge, as one of the receiver would."""
+
 _ROUNDING = 1e-5  # what float32 may move a corner, over the greatest coordinate
 _FACES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], np.float64)
 
@@ -115,10 +119,8 @@ def _looking(
     clip: tuple[float, float],
     projection: Projection = "perspective",
 ) -> Camera:
-    back = -normalize(np.asarray(direction, np.float64))
-    right = normalize(np.cross(_FACES[2] if abs(back[1]) < 0.9 else _FACES[4], back))
     frame: Matrix = np.eye(4)
-    frame[:3, :3] = np.column_stack([right, np.cross(back, right), back])
+    frame[:3, :3] = frame_along(-np.asarray(direction))
     frame[:3, 3] = position
     return Camera("<shadow>", frame, window, projection, clip)
 
@@ -135,9 +137,12 @@ class ShadowAtlas:
 class ShadowPass:
     """Draws shadow maps into an atlas of CAPACITY tiles; what one call draws the next overwrites."""
 
-    def __init__(self, gpu: Gpu, *, cutout: bool, color_varies: bool, texture_groups: int = 0) -> None:
+    def __init__(
+        self, gpu: Gpu, *, cutout: bool, color_varies: bool, texture_groups: int = 0, linked: bool = False
+    ) -> None:
         defines = ["CUTOUT"] * cutout + ["DISPLAY_COLOR_VARIES"] * (cutout and color_varies)
         defines += ["TEXTURES"] * (cutout and texture_groups > 0)
+        defines += ["LINKS"] * linked
         generated = {"generated/textures.glsl": textures_source(texture_groups)}
         size = (TILES * RESOLUTION, TILES * RESOLUTION)
         self._context = gpu.context
@@ -147,8 +152,17 @@ class ShadowPass:
         self._maps = RecordBuffer(gpu, SHADOW_MAPS)
         self._commands = gpu.keep(gpu.context.buffer(reserve=256))
 
-    def draw(self, draws: DrawList, cameras: Sequence[tuple[Camera, ...]], jitter: tuple[float, float]) -> ShadowAtlas:
-        """The maps of each light's cameras, at most CAPACITY in all; a light may have none. `jitter` is in texels."""
+    def draw(
+        self,
+        draws: DrawList,
+        cameras: Sequence[tuple[Camera, ...]],
+        jitter: tuple[float, float],
+        casters: Sequence[int] = (),
+    ) -> ShadowAtlas:
+        """The maps of each light's cameras, at most CAPACITY in all; a light may have none.
+
+        jitter: in texels.  casters: of each light, the place of its casters' link bits; all cast where none are given.
+        """
         count = np.array([len(c) for c in cameras], np.uint32)
         first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.uint32)
         maps = [camera for light in cameras for camera in light]
@@ -160,26 +174,29 @@ class ShadowPass:
             records = np.zeros(len(maps), record("ShadowMap"))
             for tile, camera in enumerate(maps):
                 records[tile] = _map_record(camera, tile, jitter)
-            self._draw_maps(draws, records)
+            self._draw_maps(draws, records, np.repeat(casters, count) if len(casters) else np.array([]))
         return ShadowAtlas(self._depth, first, count)
 
-    def _draw_maps(self, draws: DrawList, records: NDArray) -> None:
+    def _draw_maps(self, draws: DrawList, records: NDArray, casters: NDArray) -> None:
         """Each map with the commands that it may see."""
         commands = [draws.table[_may_see(m, draws.corners)] for m in records["clip_from_relative"]]
         self._write_commands(np.concatenate(commands))
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = ">"
-        vertices = [part for part in draws.vertices if any(name in self._program for name in part[2:])]
-        array = self._context.vertex_array(self._program, vertices, draws.indices)
+        self._context.polygon_offset = _DEPTH_OFFSET
+        array = self._context.vertex_array(self._program, draws.vertices_of(self._program), draws.indices)
         first = 0
         for tile, (row, seen) in enumerate(zip(records, commands, strict=True)):
             x, y = tile % TILES, tile // TILES
             self._framebuffer.viewport = (x * RESOLUTION, y * RESOLUTION, RESOLUTION, RESOLUTION)
             self._program["clip_from_relative"] = tuple(row["clip_from_relative"].ravel().tolist())
+            if "first_caster" in self._program:
+                self._program["first_caster"] = int(casters[tile])
             if len(seen):
                 array.render_indirect(self._commands, count=len(seen), first=first)
             first += len(seen)
         array.release()
+        self._context.polygon_offset = 0.0, 0.0
         self._maps.write(records)
 
     def _write_commands(self, commands: NDArray) -> None:

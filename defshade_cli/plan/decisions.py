@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from defshade_cli.gpu.planes import PLANES
-from defshade_cli.image.layers import LAYERS
 
 if TYPE_CHECKING:
     from defshade_cli.plan.plan import Plan
@@ -25,19 +24,24 @@ class Decision:
 def explain(plan: Plan) -> Iterator[Decision]:
     """Decision by decision, in the order of the pipeline."""
     yield Decision("layout", plan.layout, "as asked")
+    converted = "authored colours are converted to it"
+    yield Decision("render space", plan.render_space.name, "as authored" if plan.render_space.is_rec709 else converted)
     yield _explain_subdivision(plan)
     for plane in PLANES:
-        yield _kept(f"plane {plane.name}", plane in plan.planes, "a material or layer needs it", "nothing needs it")
+        kept = plane in plan.planes or plane in plan.data_planes
+        yield _kept(f"plane {plane.name}", kept, "a material or layer needs it", "nothing needs it")
     for volume in ("quad", "sphere", "cone"):
         count = sum(planned.volume == volume for planned in plan.lights)
         yield Decision(f"{volume} volumes", f"{count} drawn" if count else "skipped", "lights that reach geometry")
     yield _kept("shadow maps", plan.shadows, "a light casts them", "no light casts any, or none were asked")
+    yield _kept("IES profiles", bool(plan.profiles), "a light is shaped by one", "no light has one")
+    yield _kept("shadow linking", plan.shadow_linked, "a light chooses its casters", "everything casts shadows")
     yield _kept("environment", bool(plan.domes), "a dome lights the scene", "no dome")
     yield _kept("cutout", plan.cutout, "some opacity is or may be below 1", "no opacity is below 1")
     yield _kept("textures", plan.textures, "a material reads them", "no material reads any")
-    if any(LAYERS[name].source != "lighting" for name in plan.layers):
+    if plan.data_layers:
         jittered, shared = "the beauty's is jittered, quantised or dithered", "the beauty's own float sample serves"
-        yield _kept("data GBuffer", plan.data_pass or not plan.lit, jittered if plan.lit else "as asked", shared)
+        yield _kept("data GBuffer", plan.data_pass, jittered if plan.sampled else "as asked", shared)
     yield _kept("error estimate", plan.tracks_error, "as asked", "nothing needs it")
     if not plan.lit:
         yield Decision("lighting", "skipped", "no layer needs it")

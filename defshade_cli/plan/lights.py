@@ -18,7 +18,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.scene.light import DistantLight, Light
+from defshade_cli.image.light_texture import with_texture
+from defshade_cli.plan.overlap import reaches_into_ball
+from defshade_cli.scene.light import DistantLight, Light, SphereLight
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderSettings, Shading
@@ -31,11 +33,17 @@ _MIN_ALPHA = 1e-4  # shaders/lib/constants.glsl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedLight:
-    """reach: radius of the volume in scene units, infinite for a quad."""
+    """light: with its texture in memory.  number: its place among the scene's lights.
+
+    reach: radius of the volume in scene units, infinite for a quad.
+    is_empty: no geometry lies within a sphere light.
+    """
 
     light: Light
     volume: Volume
     reach: float
+    number: int = 0
+    is_empty: bool = True
 
 
 def volume_of(light: Light) -> Volume:
@@ -46,12 +54,14 @@ def volume_of(light: Light) -> Volume:
 
 
 def plan_lights(scene: Scene, exposure: float, settings: RenderSettings) -> tuple[PlannedLight, ...]:
-    lit = [light for light in scene.lights if _peak(light) > 0.0]
+    lights = enumerate(with_texture(light) for light in scene.lights)
+    lit = [(number, light) for number, light in lights if _peak(light) > 0.0]
     response = max((_greatest_response(m, settings.shading) for m in scene.materials), default=1.0)
-    share = settings.light_tolerance / max(len(lit), 1)
+    gain = exposure * response * max(len(lit), 1) / settings.light_tolerance
     order: dict[str, int] = {"quad": 0, "sphere": 1, "cone": 2}
     planned = [
-        PlannedLight(light, volume_of(light), _reach(light, scene.bounds, exposure * response / share)) for light in lit
+        PlannedLight(light, volume_of(light), _reach(light, scene.bounds, gain), number, _is_empty(light, scene))
+        for number, light in lit
     ]
     return tuple(sorted(planned, key=lambda p: order[p.volume]))
 
@@ -69,9 +79,10 @@ def _greatest_response(material: Material, shading: Shading) -> float:
 
 
 def _peak(light: Light) -> float:
-    """What a point of the light can send one way: all of L · A, which no profile exceeds."""
+    """What the light can send one way: all of L · A, which no profile exceeds, as its shaping turns it."""
     strength = light.irradiance if isinstance(light, DistantLight) else light.emission * light.power_scale
-    return float(np.max(strength)) * max(light.diffuse, light.specular)
+    shaping = light.shaping.peak if light.shaping else 1.0
+    return float(np.max(strength)) * max(light.diffuse, light.specular) * shaping
 
 
 def _reach(light: Light, bounds: NDArray[np.float64], gain: float) -> float:
@@ -80,3 +91,9 @@ def _reach(light: Light, bounds: NDArray[np.float64], gain: float) -> float:
     farthest = np.max(np.abs(bounds - light.position), axis=0)
     geometry = float(np.linalg.norm(farthest)) * (1.0 + _MARGIN)
     return min(math.sqrt(_peak(light) * gain), geometry)
+
+
+def _is_empty(light: Light, scene: Scene) -> bool:
+    if not isinstance(light, SphereLight) or light.treat_as_point:
+        return True
+    return not reaches_into_ball(scene, light.position, light.world_radius)

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.errors import UsageError
-from defshade_cli.gpu.planes import Plane, needed_planes
-from defshade_cli.image.layers import LAYERS
+from defshade_cli.gpu.planes import MOST_TARGETS, Plane, named_planes, needed_planes
+from defshade_cli.image.layers import LAYERS, resolve
+from defshade_cli.image.render_space import RenderSpace, find_render_space
 from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
 from defshade_cli.scene.camera import Camera, image_size
+from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
-from defshade_cli.settings import FILTERS, MOST_SAMPLES, Complexity, Filter, Layout, RenderSettings, Shading
+from defshade_cli.scene.window import DataWindow, from_ndc
+from defshade_cli.settings import FILTERS, Complexity, Filter, Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
 from defshade_cli.units import exposure_scale
 
@@ -27,19 +29,27 @@ _MARGIN = 1e-3  # relative slack around bounds that float32 may round outwards
 class Plan:
     """All that the passes read beside the Scene.
 
-    camera: conformed to the image.  clip: (near, far), the camera's range tightened to the geometry.
+    display, display_camera: the whole image, and the camera conformed to it.
+    window: the part of it that is rendered; size and camera are its own.
+    clip: (near, far), the camera's range tightened to the geometry.
+    render_space: of light and reflectance.
     exposure: linear, the camera's and the settings' together.
     samples: a pixel at most.  max_error, time_limit: of RenderSettings.  filter_width: pixels.
-    planes: of the GBuffer; lights: sorted quads, spheres, cones.
-    shadows: some light casts them.  background: domes are seen where no geometry is.
+    planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
+    lights: sorted quads, spheres, cones.
+    shadows: some light casts them.  shadow_linked: in some light not all geometry does.
+    background: domes are seen where no geometry is.
     cutout: some opacity may be below 1.  textures: some material reads them.
     data_pass: data layers need an unjittered float GBuffer of their own.
     levels: how often subdivision surfaces were refined, ascending; empty without any.
     """
 
-    size: tuple[int, int]
+    display: tuple[int, int]
+    display_camera: Camera
+    window: DataWindow
     camera: Camera
     clip: tuple[float, float]
+    render_space: RenderSpace
     exposure: float
     layout: Layout
     shading: Shading
@@ -50,14 +60,21 @@ class Plan:
     filter_width: float
     layers: tuple[str, ...]
     planes: tuple[Plane, ...]
+    data_planes: tuple[Plane, ...]
     lights: tuple[PlannedLight, ...]
     shadows: bool
+    shadow_linked: bool
     background: bool
     cutout: bool
     textures: bool
     data_pass: bool
     complexity: Complexity
     levels: tuple[int, ...]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) of what is rendered, in pixels."""
+        return self.window.size
 
     @property
     def lit(self) -> bool:
@@ -68,11 +85,31 @@ class Plan:
     def tracks_error(self) -> bool:
         """Is the error of the mean asked for?"""
         asked = self.max_error is not None or self.time_limit is not None or "variance" in self.layers
-        return self.lit and self.samples > 1 and asked
+        return self.sampled and self.samples > 1 and asked
+
+    @property
+    def sampled(self) -> bool:
+        """Is any layer a mean of samples?"""
+        return any(LAYERS[name].is_sampled for name in self.layers)
+
+    @property
+    def data_layers(self) -> tuple[str, ...]:
+        """Those read from planes at the pixels' centres."""
+        return tuple(name for name in self.layers if not LAYERS[name].is_sampled)
+
+    def reads(self, define: str) -> bool:
+        """Must the GBuffer's shaders interpolate what `define` names?"""
+        return any(define in plane.inputs for plane in (*self.planes, *self.data_planes))
 
     @property
     def domes(self) -> tuple[DomeLight, ...]:
         return tuple(planned.light for planned in self.lights if isinstance(planned.light, DomeLight))
+
+    @property
+    def profiles(self) -> tuple[IesProfile, ...]:
+        """The IES profiles of the lights, each once."""
+        shapings = [planned.light.shaping for planned in self.lights]
+        return tuple(dict.fromkeys(shaping.ies for shaping in shapings if shaping and shaping.ies))
 
     @property
     def volumes(self) -> tuple[Volume, ...]:
@@ -85,8 +122,7 @@ class Plan:
         before = ("gbuffer", "emission", *("environment",) * bool(self.domes), *("shadow maps",) * self.shadows)
         lighting = before + tuple(f"light {volume}" for volume in self.volumes)
         accumulation = ("accumulation",) * (self.samples > 1) + ("batch means",) * self.tracks_error
-        data = ("data gbuffer",) * (self.data_pass or not self.lit)
-        return (lighting + accumulation if self.lit else ()) + data
+        return (lighting + accumulation if self.sampled else ()) + ("data gbuffer",) * self.data_pass
 
     @property
     def decisions(self) -> tuple[Decision, ...]:
@@ -95,34 +131,38 @@ class Plan:
 
 
 def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
-    """Decide. Raises UsageError for a layer that does not exist or an image without pixels."""
-    _check_layers(settings.layers)
-    size = image_size(scene.camera.aspect, settings.size, settings.width, scene.resolution)
-    camera = scene.camera.conformed(size[0] * scene.pixel_aspect / size[1], scene.conform)
+    """Decide. Raises UsageError for a layer or a render space that does not exist, or an image without pixels."""
+    layers = resolve(settings.layers)
+    display = image_size(scene.camera.aspect, settings.size, settings.width, scene.resolution)
+    display_camera = scene.camera.conformed(display[0] * scene.pixel_aspect / display[1], scene.conform)
+    window = DataWindow(*settings.crop) if settings.crop else from_ndc(scene.data_window, display)
+    camera = replace(display_camera, window=window.of(display_camera.window, display))
     exposure = camera.exposure * exposure_scale(settings.exposure)
-    lights = plan_lights(scene, exposure, settings)
-    planes = needed_planes(scene.materials, settings.layers)
+    lights = _seen_lights(plan_lights(scene, exposure, settings), layers)
     cutout = _has_cutout(scene)
+    planes, data_planes, data_pass = _divide_planes(scene, settings, layers, cutout)
     shadows = settings.shadows and bool(scene.drawables) and any(p.light.casts_shadow for p in lights)
-    samples = settings.samples or (MOST_SAMPLES if settings.max_error or settings.time_limit else 1)
-    data_layers = [name for name in settings.layers if LAYERS[name].source != "lighting"]
-    data_pass = bool(data_layers) and (settings.layout != "float" or samples > 1 or cutout)
     return Plan(
-        size=size,
+        display=display,
+        display_camera=display_camera,
+        window=window,
         camera=camera,
         clip=_tight_clip(camera, scene.bounds),
+        render_space=find_render_space(settings.render_space or scene.rendering_space, settings.ocio),
         exposure=exposure,
         layout=settings.layout,
         shading=settings.shading,
-        samples=samples,
+        samples=settings.most_samples,
         max_error=settings.max_error,
         time_limit=settings.time_limit,
         filter=settings.filter,
         filter_width=settings.filter_width or FILTERS[settings.filter],
-        layers=settings.layers,
+        layers=layers,
         planes=planes,
+        data_planes=data_planes,
         lights=lights,
         shadows=shadows,
+        shadow_linked=shadows and scene.shadow_linked,
         background=settings.background,
         cutout=cutout,
         textures=bool(scene.textures),
@@ -132,10 +172,34 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     )
 
 
-def _check_layers(names: tuple[str, ...]) -> None:
-    unknown = [name for name in names if name not in LAYERS]
-    if unknown or not names:
-        raise UsageError(f"no layer named {', '.join(unknown) or '(none given)'}; there are {', '.join(LAYERS)}")
+def _seen_lights(lights: tuple[PlannedLight, ...], layers: tuple[str, ...]) -> tuple[PlannedLight, ...]:
+    """All lights for a lit layer; for mere coverage the domes, which cover what is behind the geometry."""
+    if any(LAYERS[name].source == "lighting" for name in layers):
+        return lights
+    return tuple(planned for planned in lights if isinstance(planned.light, DomeLight))
+
+
+def _divide_planes(
+    scene: Scene, settings: RenderSettings, layers: tuple[str, ...], cutout: bool
+) -> tuple[tuple[Plane, ...], tuple[Plane, ...], bool]:
+    """Planes of the samples' GBuffer, planes of the data layers, and whether these need a GBuffer of their own.
+
+    One exact sample at the pixels' centres serves both, unless it is jittered, quantised or dithered, or the planes
+    are too many.
+    """
+    rows = [LAYERS[name] for name in layers]
+    lit = _lit_planes(scene) if any(row.source == "lighting" for row in rows) else ()
+    data = named_planes(row.source for row in rows)
+    both = named_planes(plane.name for plane in (*lit, *data))
+    sampled, has_data = any(row.is_sampled for row in rows), not all(row.is_sampled for row in rows)
+    exact = settings.layout == "float" and settings.most_samples == 1 and not cutout and len(both) <= MOST_TARGETS
+    data_pass = has_data and not (sampled and exact)
+    return (lit if data_pass or not has_data else both), data, data_pass
+
+
+def _lit_planes(scene: Scene) -> tuple[Plane, ...]:
+    names = [plane.name for plane in needed_planes(scene.materials)]
+    return named_planes([*names, *["links"] * scene.light_linked])
 
 
 def _has_cutout(scene: Scene) -> bool:

@@ -3,6 +3,14 @@
 A surface point emits L cosθ dA. Under the light's transform M a patch with local normal n and area a becomes
 a · |cof(M) n|, so I = L · A_local · |cof(M) n| for points uniform in the shape's own coordinates; averaged over samples
 this is the integral over the true, sheared or stretched, surface. A distant light emits L over its cone of directions.
+
+All pixels share a sample's point, and points that face away from many of them are wasted. A sphere has none of those:
+a ball that glows at each point alike in all directions, L / (π √(R² − r²)) a unit of length, is seen alike, as
+
+    ∫ ds / (π √(h² − s²)) = 1   over a chord of half length h,  R² − r² = h² − s²    (Abel's integral)
+
+so that each of its points bears the same intensity L π R². A cylinder's points are drawn by the cardioid
+1 + cos φ around the direction of what is lit.
 """
 
 from __future__ import annotations
@@ -24,9 +32,12 @@ from defshade_cli.scene.light import (
     RectLight,
     SphereLight,
 )
-from defshade_cli.spaces import normalize, transform_points
+from defshade_cli.scene.radiance_map import RadianceMap
+from defshade_cli.spaces import is_similarity, normalize, transform_points
 
 Vector = NDArray[np.float64]
+Place = tuple[float, float, float]
+"""Coordinates in the unit cube."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,11 +65,15 @@ class Emitter:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Patch:
-    """A point of a light's surface in light space, its unit normal, and the area of the whole surface."""
+    """A point of a light's surface in light space, its unit normal, and the area that it stands for.
+
+    weight: (3,) on the light's mean radiance; its mean over points is 1.
+    """
 
     point: Vector
     normal: Vector
     area: float
+    weight: Vector | float = 1.0
 
 
 def far_field(light: Light) -> Emitter:
@@ -69,16 +84,22 @@ def far_field(light: Light) -> Emitter:
     return Emitter(light.position, light.axis, facing, light.profile, light.intensity_on_axis)
 
 
-def emitter_at(light: Light, u: tuple[float, float]) -> Emitter:
-    """The light's point at `u` in the unit square; lights without size give their far field."""
+def emitter_at(light: Light, u: Place, towards: Vector, *, inside: bool = True) -> Emitter:
+    """The light's point at `u`; lights without size give their far field.
+
+    towards: (3,) world space, the middle of what is lit.
+    inside: points may lie within a sphere, where no geometry does.
+    """
     if isinstance(light, DistantLight):
         return _distant(light, u)
-    patch = _patch(light, u)
+    if inside and isinstance(light, SphereLight) and not light.treat_as_point and is_similarity(light.world_from_light):
+        return _within_ball(light, u)
+    patch = _patch(light, u, towards)
     if patch is None or patch.area == 0.0 or light.size_factor == 0.0:
         return far_field(light)
     cofactor = _cofactors(light.world_from_light[:3, :3]) @ patch.normal
     stretch = float(np.linalg.norm(cofactor))
-    intensity = light.radiance * (patch.area * stretch)
+    intensity = light.radiance * patch.weight * (patch.area * stretch)
     position = transform_points(light.world_from_light, patch.point)
     return Emitter(position, light.axis, normalize(cofactor), "cosine", intensity, patch.area * stretch)
 
@@ -90,7 +111,17 @@ def sky_emitter(light: DomeLight, sky: Environment, u: tuple[float, float], shar
     return Emitter(light.position, axis, axis, "uniform", light.emission * weight * share)
 
 
-def _distant(light: DistantLight, u: tuple[float, float]) -> Emitter:
+def _within_ball(light: SphereLight, u: Place) -> Emitter:
+    """A point of the glowing ball: uniform over the disc that its axis sees, then along the chord through it."""
+    x, y = _circle(u[1], light.radius * math.sqrt(u[0]))
+    z = light.radius * math.sqrt(1.0 - u[0]) * math.sin(math.pi * (u[2] - 0.5))
+    position = transform_points(light.world_from_light, np.array([x, y, z]))
+    return Emitter(
+        position, light.axis, light.axis, "uniform", light.intensity_on_axis, math.pi * light.world_radius**2
+    )
+
+
+def _distant(light: DistantLight, u: Place) -> Emitter:
     """Directions uniform in the light's cone of solid angle 2π(1 − cosθ)."""
     half = min(max(math.radians(light.angle) / 2, 0.0), math.pi)
     if half == 0.0:
@@ -103,7 +134,7 @@ def _distant(light: DistantLight, u: tuple[float, float]) -> Emitter:
     return Emitter(light.position, axis, axis, "uniform", light.radiance * solid_angle, solid_angle)
 
 
-def _patch(light: Light, u: tuple[float, float]) -> _Patch | None:
+def _patch(light: Light, u: Place, towards: Vector) -> _Patch | None:
     match light:
         case SphereLight(treat_as_point=False, radius=r):
             z = 1.0 - 2.0 * u[0]
@@ -111,15 +142,35 @@ def _patch(light: Light, u: tuple[float, float]) -> _Patch | None:
             return _Patch(r * normal, normal, 4.0 * math.pi * r * r)
         case DiskLight(radius=r):
             return _Patch(np.array([*_circle(u[1], r * math.sqrt(u[0])), 0.0]), _FORWARD, math.pi * r * r)
-        case RectLight(width=w, height=h):
+        case RectLight(width=w, height=h, radiance_map=None):
             return _Patch(np.array([(u[0] - 0.5) * w, (u[1] - 0.5) * h, 0.0]), _FORWARD, w * h)
+        case RectLight(width=w, height=h, radiance_map=RadianceMap() as shown):
+            (s, t), weight = shown.sample(u[:2])  # its top left is at (+X, +Y)
+            return _Patch(np.array([(0.5 - s) * w, (0.5 - t) * h, 0.0]), _FORWARD, w * h, weight)
         case CylinderLight(radius=r, length=length):
-            normal = np.array([0.0, *_circle(u[1], 1.0)])
-            return _Patch(r * normal + [(u[0] - 0.5) * length, 0.0, 0.0], normal, 2.0 * math.pi * r * length)
+            turn, density = _cardioid(u[1])
+            normal = np.array([0.0, *_circle(turn + _turn_towards(light, towards), 1.0)])
+            return _Patch(r * normal + [(u[0] - 0.5) * length, 0.0, 0.0], normal, math.tau * r * length / density)
     return None
 
 
 _FORWARD = np.array([0.0, 0.0, -1.0])
+
+
+def _turn_towards(light: Light, towards: Vector) -> float:
+    """Around the light's X axis from Y, in turns."""
+    y, z = np.linalg.solve(light.world_from_light[:3, :3], towards - light.position)[1:]
+    return math.atan2(z, y) / math.tau
+
+
+def _cardioid(u: float) -> tuple[float, float]:
+    """The turn within ±1/2 at quantile `u` of the density 1 + cos(2π · turn), and its density."""
+    low, high = -0.5, 0.5
+    for _ in range(40):
+        turn = 0.5 * (low + high)
+        below = turn + math.sin(math.tau * turn) / math.tau + 0.5 < u
+        low, high = (turn, high) if below else (low, turn)
+    return turn, 1.0 + math.cos(math.tau * turn)
 
 
 def _circle(turn: float, radius: float) -> tuple[float, float]:

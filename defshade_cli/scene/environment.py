@@ -14,11 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.scene.arrays import frozen
+from defshade_cli.scene.distribution import GridDistribution
 
 _CELLS = (128, 256)
 """Rows and columns that directions are drawn from; a finer map is averaged into them."""
 
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+"""Of linear Rec. 709."""
+
 _COSINE_LOBE = np.array([math.pi, *[2 * math.pi / 3] * 3, *[math.pi / 4] * 5])
 
 
@@ -36,16 +39,11 @@ class Environment:
 
         The mean of the second over samples is the integral of the radiance over all directions; black skies give 0.
         """
-        rows, columns = self._rows, self._columns
-        row, v = _draw(rows, u[0])
-        column, t = _draw(columns[row], u[1])
-        sine_top, sine_bottom = self._sines[row], self._sines[row + 1]
-        sine = sine_top + (sine_bottom - sine_top) * v
-        left, right = self._longitudes[column], self._longitudes[column + 1]
-        longitude = left + (right - left) * t
+        row, column, down, right, chance = self._distribution.draw(u)
+        sine = self._sines[row] + (self._sines[row + 1] - self._sines[row]) * down
+        longitude = self._longitudes[column] + (self._longitudes[column + 1] - self._longitudes[column]) * right
         cosine = math.sqrt(max(1.0 - sine * sine, 0.0))
         direction = np.array([math.sin(longitude) * cosine, sine, math.cos(longitude) * cosine])
-        chance = _step(rows, row) * _step(columns[row], column)
         return direction, self._cells[row, column] * (self._solid_angles[row, column] / chance if chance > 0 else 0.0)
 
     @cached_property
@@ -94,16 +92,8 @@ class Environment:
         return np.outer(np.diff(self._sines), np.diff(self._longitudes))
 
     @cached_property
-    def _weights(self) -> NDArray[np.float64]:
-        return np.maximum(self._cells @ _LUMINANCE, 0.0) * self._solid_angles
-
-    @cached_property
-    def _rows(self) -> NDArray[np.float64]:
-        return _cumulative(self._weights.sum(axis=1))
-
-    @cached_property
-    def _columns(self) -> NDArray[np.float64]:
-        return _cumulative(self._weights)
+    def _distribution(self) -> GridDistribution:
+        return GridDistribution(np.maximum(self._cells @ LUMINANCE, 0.0) * self._solid_angles)
 
 
 def uniform_environment() -> Environment:
@@ -119,22 +109,3 @@ def harmonics(directions: NDArray[np.float64]) -> NDArray[np.float64]:
     bands = [c0 * np.ones_like(x), c1 * y, c1 * z, c1 * x]
     bands += [c2 * x * y, c2 * y * z, c20 * (3 * z * z - 1), c2 * x * z, c22 * (x * x - y * y)]
     return np.stack(bands, axis=-1)
-
-
-def _cumulative(weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distribution function along the last axis; even where all weights are 0."""
-    total = weights.sum(axis=-1, keepdims=True)
-    even = np.where(total > 0, weights, 1.0)
-    return np.cumsum(even, axis=-1) / even.sum(axis=-1, keepdims=True)
-
-
-def _draw(distribution: NDArray[np.float64], u: float) -> tuple[int, float]:
-    """The step that `u` falls on, and how far into it, in [0, 1]."""
-    index = min(int(np.searchsorted(distribution, u, side="right")), len(distribution) - 1)
-    before = float(distribution[index - 1]) if index else 0.0
-    step = float(distribution[index]) - before
-    return index, min((u - before) / step, 1.0) if step > 0 else 0.5
-
-
-def _step(distribution: NDArray[np.float64], index: int) -> float:
-    return float(distribution[index] - (distribution[index - 1] if index else 0.0))

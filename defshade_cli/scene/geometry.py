@@ -104,6 +104,7 @@ class Drawable:
     paths: prim path of each instance, or one path that all share (a PointInstancer's prototype).
     instance_ids: (N,) int32, PointInstancer ids or instance order; −1 for what is not instanced.
     display_color, display_opacity: (N, 3) and (N,) float32, scene-linear; a varying colour of the mesh replaces them.
+    link_sets: (N,) uint32, what scene.linking.Links count; 0 where no light leaves anything out.
     """
 
     mesh: int
@@ -113,6 +114,7 @@ class Drawable:
     instance_ids: NDArray[np.int32] = field(default_factory=lambda: np.full(1, -1, np.int32))
     display_color: NDArray[np.float32] = field(default_factory=lambda: np.full((1, 3), 0.18, np.float32))
     display_opacity: NDArray[np.float32] = field(default_factory=lambda: np.ones(1, np.float32))
+    link_sets: NDArray[np.uint32] | None = None
 
     def __post_init__(self) -> None:
         count = len(self.world_from_object)
@@ -121,5 +123,7 @@ class Drawable:
         freeze = object.__setattr__
         freeze(self, "world_from_object", frozen(self.world_from_object, np.float64, count, 4, 4))
         freeze(self, "instance_ids", frozen(self.instance_ids, np.int32, count))
+        sets = np.zeros(count) if self.link_sets is None else self.link_sets
+        freeze(self, "link_sets", frozen(sets, np.uint32, count))
         freeze(self, "display_color", frozen(self.display_color, np.float32, count, 3))
         freeze(self, "display_opacity", frozen(self.display_opacity, np.float32, count))

@@ -21,6 +21,10 @@ from numpy.typing import NDArray
 
 from defshade_cli.scene.arrays import frozen
 from defshade_cli.scene.environment import Environment
+from defshade_cli.scene.ies import IesProfile
+from defshade_cli.scene.linking import Links
+from defshade_cli.scene.radiance_map import RadianceMap
+from defshade_cli.scene.texture import ImageFile
 from defshade_cli.spaces import Matrix, normalize
 
 Profile = Literal["uniform", "cosine", "sine"]
@@ -31,14 +35,38 @@ _GAIN: dict[Profile, float] = {"uniform": 0.25, "cosine": 1.0, "sine": 1.0 / mat
 class Shaping:
     """UsdLuxShapingAPI. Angles in degrees off the light's axis; focus_tint scene-linear.
 
-    ies_file: authored path of a profile, kept for reports.
+    ies: a profile of its own, measured from the light's axis; ies_angle_scale stretches its vertical angles.
+    ies_normalize: the profile's mean counts as 1, so that it leaves the light's power.
     """
 
     focus: float = 0.0
     focus_tint: tuple[float, float, float] = (0.0, 0.0, 0.0)
     cone_angle: float = 90.0
     cone_softness: float = 0.0
-    ies_file: str | None = None
+    ies: IesProfile | None = None
+    ies_angle_scale: float = 0.0
+    ies_normalize: bool = False
+
+    @property
+    def ies_scale(self) -> float:
+        """What the profile's candela are multiplied with; 0 without one, or where a normalised one gives no light."""
+        if self.ies is None or not self.ies_normalize:
+            return float(self.ies is not None)
+        return 1.0 / self.ies.mean if self.ies.mean > 0.0 else 0.0
+
+    @property
+    def ies_vertical(self) -> tuple[float, float]:
+        """(a, b): the profile is read at a · θ + b radians, within 0 and π, for light that leaves at θ off the axis."""
+        scale = self.ies_angle_scale
+        if scale == 0.0:
+            return 1.0, 0.0
+        return (1.0 / scale, 0.0) if scale > 0.0 else (-1.0 / scale, math.pi + math.pi / scale)
+
+    @property
+    def peak(self) -> float:
+        """The greatest factor that shaping puts on what leaves one way; a tint may pass 1."""
+        tint = max(1.0, *self.focus_tint)
+        return tint if self.ies is None else tint * self.ies.peak * self.ies_scale
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -48,6 +76,7 @@ class Light(ABC):
     world_from_light: (4, 4) float64, scale included: sizes are world-space ones.
     color: (3,) float64 scene-linear, colour temperature multiplied in.
     diffuse, specular: UsdLux's multipliers of the two responses.
+    links: None where all geometry is lit and casts shadows.
     """
 
     path: str
@@ -60,6 +89,7 @@ class Light(ABC):
     specular: float = 1.0
     shaping: Shaping | None = None
     casts_shadow: bool = True
+    links: Links | None = None
 
     kind: ClassVar[str]
     is_infinite: ClassVar[bool] = False
@@ -78,6 +108,15 @@ class Light(ABC):
     def axis(self) -> NDArray[np.float64]:
         """(3,) unit: the direction of emission, −Z of the light."""
         return normalize(-self.world_from_light[:3, 2])
+
+    @property
+    def frame(self) -> NDArray[np.float64]:
+        """(3, 3) unit columns: the light's X and Y made square to its Z, and Z; mirrored where the light is."""
+        z = -self.axis
+        x = self.world_from_light[:3, 0] - z * float(np.dot(z, self.world_from_light[:3, 0]))
+        y = self.world_from_light[:3, 1]
+        x = normalize(x)
+        return np.column_stack([x, np.cross(z, x) * (-1.0 if np.dot(np.cross(z, x), y) < 0.0 else 1.0), z])
 
     @property
     def emission(self) -> NDArray[np.float64]:
@@ -154,6 +193,11 @@ class SphereLight(Light):
     kind = "sphere"
 
     @property
+    def world_radius(self) -> float:
+        """The greatest, where the transform makes an ellipsoid of the sphere."""
+        return self.radius * float(np.linalg.norm(self.world_from_light[:3, :3], ord=2))
+
+    @property
     def size_factor(self) -> float:
         """Area of the ellipsoid that the transform makes: 4π R_G(a²b², a²c², b²c²) (DLMF 19.33.1)."""
         a, b, c = (self.radius * np.linalg.svd(self.world_from_light[:3, :3], compute_uv=False)) ** 2
@@ -178,10 +222,22 @@ class DiskLight(Light):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RectLight(Light):
+    """texture: an image on its face, upright to what it lights; radiance_map: the same in memory, as the plan reads it.
+
+    The image multiplies the light, and `emission` is the mean over the face.
+    """
+
     width: float = 1.0
     height: float = 1.0
+    texture: ImageFile | None = None
+    radiance_map: RadianceMap | None = None
     kind = "rect"
     profile = "cosine"
+
+    @property
+    def emission(self) -> NDArray[np.float64]:
+        even = super().emission
+        return even * self.radiance_map.mean if self.radiance_map else even
 
     @property
     def size_factor(self) -> float:

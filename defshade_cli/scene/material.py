@@ -23,6 +23,7 @@ TEXTURED_FIELDS = (
     "clearcoat_roughness",
     "opacity",
     "ior",
+    "occlusion",
     "normal",
 )
 """What a texture may feed: fields of Material, and the normal in tangent space, which has no constant."""
@@ -34,6 +35,7 @@ class Material:
 
     uses_display_color: diffuse_color and opacity come from the drawable's displayColor and displayOpacity:
         the material of a prim that has none bound, or a displayColor reader.
+    one_sided: not seen from behind; only for materials whose opacity is textured, as the cards of draw modes are.
     inputs: the textures, by the name of the field in TEXTURED_FIELDS that they replace.
     """
 
@@ -50,7 +52,9 @@ class Material:
     opacity_threshold: float = 0.0
     opacity_mode: Literal["transparent", "presence"] = "transparent"
     ior: float = 1.5
+    occlusion: float = 1.0
     uses_display_color: bool = False
+    one_sided: bool = False
     inputs: Mapping[str, TextureInput] = field(default_factory=dict, hash=False)
 
     @property

@@ -13,6 +13,7 @@ from defshade_cli.scene.geometry import Drawable, Mesh, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.texture import Texture
+from defshade_cli.scene.window import WHOLE_IMAGE
 from defshade_cli.spaces import ConformPolicy
 
 
@@ -30,7 +31,9 @@ class Scene:
 
     camera: the one to render; cameras: the paths of all that the stage has.
     frame: time code, None for the default time.
-    resolution, pixel_aspect, conform: of the stage's UsdRenderSettings, where it names one.
+    resolution, pixel_aspect, conform, data_window: of the stage's UsdRenderSettings, where it names one; the window
+        is (xmin, ymin, xmax, ymax), 0..1 over the image, y up.
+    rendering_space: the colour space that they name; None for linear Rec.709, in which a Scene's colours are.
     """
 
     name: str
@@ -48,6 +51,8 @@ class Scene:
     resolution: tuple[int, int] | None = None
     pixel_aspect: float = 1.0
     conform: ConformPolicy = "expandAperture"
+    data_window: tuple[float, float, float, float] = WHOLE_IMAGE
+    rendering_space: str | None = None
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
@@ -59,6 +64,16 @@ class Scene:
         """(D, 2, 3) world-space box around all placements of each drawable; (+inf, −inf) around none."""
         boxes = [world_boxes(self.meshes[d.mesh].bounds, d.world_from_object) for d in self.drawables]
         return np.array([enclose([box]) for box in boxes]).reshape(-1, 2, 3)
+
+    @property
+    def light_linked(self) -> bool:
+        """Does some light leave geometry unlit?"""
+        return any(light.links and not light.links.lights.all() for light in self.lights)
+
+    @property
+    def shadow_linked(self) -> bool:
+        """Is there geometry that casts no shadow in some light?"""
+        return any(light.links and not light.links.casts.all() for light in self.lights)
 
     @cached_property
     def textures(self) -> tuple[Texture, ...]:

@@ -51,6 +51,11 @@ def read_bindings(prim: Usd.Prim) -> Bindings:
     return Bindings(full, preview, _binding(everywhere))
 
 
+def bound_to(material: str) -> Bindings:
+    """For all purposes."""
+    return Bindings(all_purpose=Binding(Sdf.Path(material), stronger=True))
+
+
 def _binding(relationship: Usd.Relationship) -> Binding | None:
     """The relationship of a collection targets the collection too, which is a property."""
     targets = relationship.GetForwardedTargets() if relationship else ()

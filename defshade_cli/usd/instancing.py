@@ -16,21 +16,47 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Usd
+from pxr import Gf, Sdf, Usd
 
 from defshade_cli.scene.light import Light
 from defshade_cli.usd.binding import NOTHING_BOUND, Bindings
 from defshade_cli.usd.geometry import Surface
 from defshade_cli.usd.primvars import read_display
+from defshade_cli.usd.skel import Rig
 from defshade_cli.usd.xform import IDENTITY
 
 
 class Standing(NamedTuple):
-    """What a prim hands down. in_world: root_from_prim leads to world space, because an xform stack was reset."""
+    """What a prim hands down.
+
+    in_world: root_from_prim leads to world space, because an xform stack was reset.
+    draw_mode: of the models below; None below what is no model, where there are no others.
+    rig: the outermost SkelRoot.
+    proxied: the prototype that is walked and an instance of it, by whose proxies its prims are known on the stage.
+    """
 
     root_from_prim: Gf.Matrix4d = IDENTITY
     in_world: bool = False
     purpose: str | None = None
+    draw_mode: str | None = None
+    rig: Rig | None = None
+    proxied: tuple[Sdf.Path, Sdf.Path] | None = None
+
+    def on_stage(self, prim: Usd.Prim) -> Usd.Prim:
+        """The prim, or the proxy of one in a prototype."""
+        if self.proxied is None:
+            return prim
+        return prim.GetStage().GetPrimAtPath(prim.GetPath().ReplacePrefix(*self.proxied))
+
+    def with_rig(self, root: Usd.Prim) -> Standing:
+        """The same with a SkelRoot that stands here, unless one stands above."""
+        return self if self.rig else self._replace(rig=Rig(self.on_stage(root), self.root_from_prim, self.in_world))
+
+    def inside(self, instance: Usd.Prim) -> Standing:
+        """What an instance hands down into its prototype: nothing but its rig."""
+        proxy = self.on_stage(instance)
+        rig = Rig(proxy, IDENTITY, False) if self.rig else None
+        return Standing(rig=rig, proxied=(instance.GetPrototype().GetPath(), proxy.GetPath()))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,7 +1,7 @@
 """UsdLux lights in scene terms.
 
-What the scene cannot say yet (lights made of geometry, portals, plug-in lights, IES profiles, textures,
-filters, linking, connected inputs) is reported; a light that has some of these is read without them.
+What the scene cannot say yet (lights made of geometry, portals, plug-in lights, filters, connected inputs)
+is reported; a light that has some of these is read without them.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from defshade_cli.scene.light import (
 )
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.dome import is_dome, pole, sky_texture
+from defshade_cli.usd.light_files import with_files
 
 CAMERA_LIGHT = "<camera light>"
 """Path of the light of a stage that has none."""
@@ -63,7 +64,8 @@ def read_light(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Light | None, tuple[
             if light_class is SphereLight:
                 fields["treat_as_point"] = bool(UsdLux.SphereLight(prim).GetTreatAsPointAttr().Get(time))
             light = light_class(path=path, world_from_light=np.eye(4), **_common(prim, time), **fields)
-            return light, tuple(Unsupported(path, reason) for reason in _left_out(prim, time))
+            light, lost = with_files(light, prim, time)
+            return light, tuple(Unsupported(path, reason) for reason in (*lost, *_left_out(prim, time)))
     return None, (Unsupported(path, f"lights of type {prim.GetTypeName()} are not supported yet"),)
 
 
@@ -98,27 +100,19 @@ def _common(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any]:
 
 
 def _shaping(prim: Usd.Prim, time: Usd.TimeCode) -> Shaping:
-    profile = _input(prim, "shaping:ies:file", time)
     return Shaping(
         focus=max(_input(prim, "shaping:focus", time), 0.0),
         focus_tint=tuple(_input(prim, "shaping:focusTint", time)),
         cone_angle=_input(prim, "shaping:cone:angle", time),
         cone_softness=min(max(_input(prim, "shaping:cone:softness", time), 0.0), 1.0),
-        ies_file=(profile.path or None) if profile else None,
+        ies_angle_scale=_input(prim, "shaping:ies:angleScale", time),
+        ies_normalize=_input(prim, "shaping:ies:normalize", time),
     )
 
 
 def _left_out(prim: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
-    api = UsdLux.LightAPI(prim)
-    for link in (api.GetLightLinkCollectionAPI(), api.GetShadowLinkCollectionAPI()):
-        if not link.GetIncludeRootAttr().Get() or link.GetExcludesRel().HasAuthoredTargets():
-            yield f"{link.GetName()} is ignored: everything is linked"
-    if api.GetFiltersRel().GetForwardedTargets():
+    if UsdLux.LightAPI(prim).GetFiltersRel().GetForwardedTargets():
         yield "light filters are ignored"
-    for name in ("shaping:ies:file",) if is_dome(prim) else ("texture:file", "shaping:ies:file"):
-        file = _input(prim, name, time)
-        if file and file.path:
-            yield f"inputs:{name} is ignored"
     connected = [attr.GetName() for attr in prim.GetAuthoredAttributes() if attr.HasAuthoredConnections()]
     if connected:
         yield f"connections are ignored: {', '.join(connected)}"

@@ -33,12 +33,13 @@ _FIELDS = {
     "opacityThreshold": "opacity_threshold",
     "opacityMode": "opacity_mode",
     "ior": "ior",
+    "occlusion": "occlusion",
     "normal": "normal",
 }
 """UsdPreviewSurface inputs and the fields they fill; a normal only from a texture."""
 
 _WITHOUT_EFFECT = ("occlusion",)
-"""Inputs that direct light does not see: occlusion dims what comes from all around."""
+"""Inputs that direct light does not see: occlusion dims what comes from all around. Only a layer shows it."""
 
 _DEFAULTS = {f.name: f.default for f in fields(Material)}
 _CHANNELS = {"r": slice(0, 1), "g": slice(1, 2), "b": slice(2, 3), "a": slice(3, 4)}
@@ -65,8 +66,13 @@ class _Inputs:
     left_out: list[str] = field(default_factory=list)
 
 
-def read_material(stage: Usd.Stage, path: Sdf.Path, shown_as: str, time: Usd.TimeCode) -> ReadMaterial:
-    """The material at `path`, reported as `shown_as`; one that is not understood is drawn like an unbound one."""
+def read_material(
+    stage: Usd.Stage, path: Sdf.Path, shown_as: str, time: Usd.TimeCode, *, occlusion: bool = False
+) -> ReadMaterial:
+    """The material at `path`, reported as `shown_as`; one that is not understood is drawn like an unbound one.
+
+    occlusion: read it too.
+    """
     prim = UsdShade.Material(stage.GetPrimAtPath(path))
     if not prim:
         return _not_understood(shown_as, "the bound material does not exist")
@@ -74,7 +80,7 @@ def read_material(stage: Usd.Stage, path: Sdf.Path, shown_as: str, time: Usd.Tim
     identifier = shader.GetShaderId() if shader else None
     if identifier != "UsdPreviewSurface":
         return _not_understood(shown_as, _surface_named(prim, shader, identifier))
-    inputs = _read_inputs(shader, Network(time))
+    inputs = _read_inputs(shader, Network(time), () if occlusion else _WITHOUT_EFFECT)
     material = Material(shown_as, **inputs.values, inputs=inputs.textures)
     inputs.left_out.extend(f"textures at primvar {name}" for name in material.uv_names[UV_SETS:])
     reason = f"not read: {', '.join(inputs.left_out)}"
@@ -97,12 +103,12 @@ def _surface_named(material: UsdShade.Material, shader: UsdShade.Shader, identif
     return f"no UsdPreviewSurface, only {', '.join(contexts)}" if contexts else "no surface"
 
 
-def _read_inputs(shader: UsdShade.Shader, network: Network) -> _Inputs:
+def _read_inputs(shader: UsdShade.Shader, network: Network, skipped: tuple[str, ...]) -> _Inputs:
     inputs = _Inputs(network)
     for authored in shader.GetInputs():
         name = authored.GetBaseName()
         source = network.source(shader, name)
-        if source is None or name in _WITHOUT_EFFECT:
+        if source is None or name in skipped:
             continue
         if computed(source):
             _take_from_node(inputs, name, source)

@@ -6,27 +6,34 @@ from dataclasses import replace
 
 from pxr import Sdf, Usd, UsdGeom
 
+from defshade_cli.scene.extras import NO_EXTRAS, Extras
+from defshade_cli.usd import draw_mode
 from defshade_cli.usd.binding import Bindings, read_bindings
 from defshade_cli.usd.geometry import Surface, is_time_varying, read_surface
 from defshade_cli.usd.kind import Kinds
 from defshade_cli.usd.material import ReadMaterial, read_material
+from defshade_cli.usd.skel import Rigs
 
 
 class Memory:
     """The unchanging parts of one stage, and the names of what stands in its prototypes.
 
-    kinds: of prims.  xforms: USD's cache, which drops only what varies when its time is set.
+    kinds: of prims.  rigs: what skeletons deform.
+    xforms: USD's cache, which drops only what varies when its time is set.
     """
 
-    def __init__(self, stage: Usd.Stage) -> None:
+    def __init__(self, stage: Usd.Stage, extras: Extras = NO_EXTRAS) -> None:
         self.kinds = Kinds()
+        self.rigs = Rigs()
         self.xforms = UsdGeom.XformCache()
-        self._stage = stage
+        self._stage, self._extras = stage, extras
         self._surfaces: dict[Sdf.Path, tuple[Usd.TimeCode, Surface | None]] = {}
         self._time_varying: dict[Sdf.Path, bool] = {}
         self._bindings: dict[Sdf.Path, Bindings] = {}
         self._materials: dict[Sdf.Path, ReadMaterial] = {}
         self._first_instances: dict[str, str] = {}
+        self._models = draw_mode.StandIns()
+        self._stand_ins: dict[tuple[Sdf.Path, str], Surface] = {}
 
     def surface(self, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
         """The same object at every time, unless something of the prim varies."""
@@ -35,14 +42,25 @@ class Memory:
             time_read, surface = self._surfaces[path]
             if time == time_read or not self._is_time_varying(prim):
                 return surface
-        surface = self._as_shown(read_surface(prim, time), path)
+        read = read_surface(prim, time)
+        surface = None if read is None else self._as_shown(read, path)
         self._surfaces[path] = time, surface
         return surface
+
+    def stand_in(self, prim: Usd.Prim, mode: str) -> Surface:
+        """What is drawn of a model in a draw mode; it does not vary over time."""
+        key = prim.GetPath(), mode
+        if key not in self._stand_ins:
+            self._stand_ins[key] = self._as_shown(self._models.read(prim, mode), prim.GetPath())
+        return self._stand_ins[key]
 
     def material(self, path: Sdf.Path, time: Usd.TimeCode) -> ReadMaterial:
         if path in self._materials:
             return self._materials[path]
-        read = read_material(self._stage, path, self.shown(path), time)
+        if path.IsPropertyPath():
+            read = draw_mode.read_material(self._stage, path, self.shown(path))
+        else:
+            read = read_material(self._stage, path, self.shown(path), time, occlusion=self._extras.occlusion)
         if not read.time_varying:
             self._materials[path] = read
         return read
@@ -70,9 +88,9 @@ class Memory:
             self._time_varying[path] = is_time_varying(prim)
         return self._time_varying[path]
 
-    def _as_shown(self, surface: Surface | None, path: Sdf.Path) -> Surface | None:
+    def _as_shown(self, surface: Surface, path: Sdf.Path) -> Surface:
         shown = self.shown(path)
-        if surface is None or shown == surface.path:
+        if shown == surface.path:
             return surface
         issues = tuple(replace(issue, path=shown) for issue in surface.issues)
         return replace(surface, path=shown, issues=issues)

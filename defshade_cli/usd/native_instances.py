@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from pxr import Gf, Sdf, Usd
+from pxr import Sdf, Usd
 
 from defshade_cli.usd.binding import Bindings
 from defshade_cli.usd.instancing import Placement, Standing, read_display_of_instances
@@ -16,9 +16,10 @@ from defshade_cli.usd.xform import matrices
 
 
 class Sharing(NamedTuple):
-    """What instances have in common that are placed together."""
+    """What instances have in common that are placed together. animation: that their skeletons inherit."""
 
     prototype: Sdf.Path
+    animation: Sdf.Path | None
     bindings: Bindings
     in_world: bool
     purpose: str | None
@@ -28,7 +29,7 @@ class Instance(NamedTuple):
     """order: among the instances of its prototype in the subtree."""
 
     prim: Usd.Prim
-    root_from_prim: Gf.Matrix4d
+    here: Standing
     order: int
 
 
@@ -46,31 +47,30 @@ class NativeInstances:
 
     def add(self, prim: Usd.Prim, here: Standing) -> None:
         prototype = prim.GetPrototype().GetPath()
-        sharing = Sharing(prototype, self._memory.bindings(prim.GetPath()), here.in_world, here.purpose)
-        self._shared[sharing].append(Instance(prim, here.root_from_prim, self._met[prototype]))
+        animation = self._memory.rigs.animation_of(here.on_stage(prim))
+        sharing = Sharing(prototype, animation, self._memory.bindings(prim.GetPath()), here.in_world, here.purpose)
+        self._shared[sharing].append(Instance(prim, here, self._met[prototype]))
         self._met[prototype] += 1
 
-    def placements(self, time: Usd.TimeCode) -> Iterator[tuple[Usd.Prim, Placement]]:
-        """Each prototype, as often as its instances differ in what they share, with their placement."""
+    def placements(self, time: Usd.TimeCode) -> Iterator[tuple[Sharing, Instance, Placement]]:
+        """What some instances share, the first of them, and the placement of all, for each prototype and difference."""
         for sharing, instances in self._shared.items():
-            prototype = instances[0].prim.GetPrototype()
-            yield prototype, self._placement(prototype, sharing, instances, time)
+            yield sharing, instances[0], self._placement(sharing, instances, time)
 
-    def _placement(
-        self, prototype: Usd.Prim, sharing: Sharing, instances: list[Instance], time: Usd.TimeCode
-    ) -> Placement:
+    def _placement(self, sharing: Sharing, instances: list[Instance], time: Usd.TimeCode) -> Placement:
+        first = instances[0].prim
         displays = [
             read_display_of_instances(instance.prim, time, 1, self.issues.setdefault(instance.prim, []))
             for instance in instances
         ]
         return Placement(
-            matrices([instance.root_from_prim for instance in instances]),
+            matrices([instance.here.root_from_prim for instance in instances]),
             np.array([instance.order for instance in instances], np.int32),
             np.concatenate([color for color, _ in displays]),
             np.concatenate([opacity for _, opacity in displays]),
             sharing.purpose,
             sharing.bindings,
             sharing.in_world,
-            prototype=self._memory.name_prototype(prototype, instances[0].prim),
+            prototype=self._memory.name_prototype(first.GetPrototype(), first),
             roots=tuple(self._memory.shown(instance.prim.GetPath()) for instance in instances),
         )

@@ -11,6 +11,7 @@ from pxr import Usd
 
 from defshade_cli.errors import EmptyStage
 from defshade_cli.scene.camera import Camera, image_size
+from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import UNBOUND
@@ -22,6 +23,7 @@ from defshade_cli.usd.complexity import View, choose_levels
 from defshade_cli.usd.geometry import Gprim, Surface
 from defshade_cli.usd.instancing import Piece
 from defshade_cli.usd.light import camera_light
+from defshade_cli.usd.linking import link
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.palette import Palette
 from defshade_cli.usd.settings import read_settings
@@ -39,6 +41,7 @@ class StageReader:
 
     camera: path or name; without it the rule of usd/camera.py picks.  purposes: of the geometry that is drawn.
     complexity: of subdivision surfaces; for `auto` it matters how large the image is, see scene.camera.image_size.
+    extras: what only some layers need.
     Raises PrimNotFound for a camera that the stage lacks.
     """
 
@@ -51,14 +54,15 @@ class StageReader:
         complexity: Complexity = "auto",
         size: tuple[int, int] | None = None,
         width: int | None = None,
+        extras: Extras = NO_EXTRAS,
     ) -> None:
         self._stage, self._purposes = stage, tuple(purposes)
         self._complexity, self._size, self._width = complexity, size, width
-        self._memory = Memory(stage)
+        self._memory = Memory(stage, extras)
         self._tessellation = Tessellation()
         self._settings = read_settings(stage)
         self._cameras = find_cameras(stage)
-        self._issues = (*(arc.unsupported for arc in find_unresolved(stage)), *self._settings.issues)
+        self._issues = tuple(arc.unsupported for arc in find_unresolved(stage))
         self._camera = choose_camera(stage, self._cameras, camera, self._settings.camera)
 
     @property
@@ -91,14 +95,14 @@ class StageReader:
         gprims = self._tessellate(drawn, camera)
         palette = Palette(self._memory, time)
         meshes: dict[Mesh, int] = {}
-        drawables = tuple(_drawables(drawn, gprims, meshes, palette))
+        lights, drawables = link(self._stage, list(_lights(pieces)), list(_drawables(drawn, gprims, meshes, palette)))
         mended = dict.fromkeys(issue for gprim in gprims.values() for issue in gprim.issues)
         return Scene(
             name=facts.stage_name(self._stage),
             meshes=tuple(meshes),
             drawables=drawables,
             materials=palette.materials,
-            lights=tuple(_lights(pieces)),
+            lights=lights,
             camera=camera,
             cameras=self._cameras,
             unsupported=(*self._issues, *traversal.issues, *mended, *palette.issues, *camera_issues),
@@ -109,6 +113,8 @@ class StageReader:
             resolution=self._settings.resolution,
             pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
+            data_window=self._settings.data_window,
+            rendering_space=self._settings.rendering_space,
         )
 
     def _read_camera(

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 from pxr import Usd, UsdRender
 
 from defshade_cli.scene.camera import Camera
-from defshade_cli.scene.scene import Unsupported
+from defshade_cli.scene.window import WHOLE_IMAGE
 from defshade_cli.spaces import ConformPolicy
 
 log = logging.getLogger("defshade")
@@ -21,7 +20,6 @@ _POLICIES: tuple[ConformPolicy, ...] = (
     "adjustApertureWidth",
     "adjustApertureHeight",
 )
-_WHOLE_WINDOW = (0.0, 0.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +28,8 @@ class StageSettings:
 
     camera: prim path.
     pixel_aspect: width over height of a pixel; None lets the image cover the camera's aperture exactly.
+    data_window: (xmin, ymin, xmax, ymax), 0..1 over the image, y up.
+    rendering_space: colour space that the image is rendered in.
     instantaneous: the shutter closes when it opens.
     """
 
@@ -37,10 +37,11 @@ class StageSettings:
     resolution: tuple[int, int] | None = None
     pixel_aspect: float | None = 1.0
     conform: ConformPolicy = "expandAperture"
+    data_window: tuple[float, float, float, float] = WHOLE_IMAGE
+    rendering_space: str | None = None
     motion_blur: bool = True
     instantaneous: bool = False
     depth_of_field: bool = True
-    issues: tuple[Unsupported, ...] = ()
 
     def applied_to(self, camera: Camera) -> Camera:
         """`camera` with the effects that the settings switch off."""
@@ -72,10 +73,11 @@ def read_settings(stage: Usd.Stage) -> StageSettings:
         resolution=(width, height) if min(width, height) > 0 else None,
         pixel_aspect=None if stretch else max(float(_value(prims, "pixelAspectRatio")), 0.0) or 1.0,
         conform=next((known for known in _POLICIES if known == policy), "expandAperture"),
+        data_window=tuple(_value(prims, "dataWindowNDC")),
+        rendering_space=settings.GetRenderingColorSpaceAttr().Get() or None,
         motion_blur=not _value(prims, "disableMotionBlur"),
         instantaneous=bool(_value(prims, "instantaneousShutter")),
         depth_of_field=not _value(prims, "disableDepthOfField"),
-        issues=tuple(_issues(prims)),
     )
 
 
@@ -102,8 +104,3 @@ def _value(prims: tuple[Usd.Prim, ...], name: str) -> Any:
 def _camera(prims: tuple[Usd.Prim, ...]) -> str | None:
     targets = (target for prim in prims for target in prim.GetRelationship("camera").GetForwardedTargets())
     return next((str(target) for target in targets), None)
-
-
-def _issues(prims: tuple[Usd.Prim, ...]) -> Iterator[Unsupported]:
-    if tuple(_value(prims, "dataWindowNDC")) != _WHOLE_WINDOW:
-        yield Unsupported(str(prims[0].GetPath()), "dataWindowNDC: the whole window is rendered")

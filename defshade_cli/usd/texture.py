@@ -37,7 +37,7 @@ def read_texture_input(network: Network, output: Usd.Attribute) -> TextureInput:
         raise Unreadable("texture without file")
     uv, texture_from_uv = _coordinates(network, network.source(node, "st"))
     texture = Texture(
-        tiles=_tiles(asset, attribute),
+        tiles=image_tiles(asset, attribute),
         udim=UsdShade.UdimUtils.IsUdimIdentifier(asset.path),
         color_space=_one_of(network.value(node, "sourceColorSpace"), get_args(ColorSpace), "auto"),
         wrap_s=_one_of(network.value(node, "wrapS"), get_args(Wrap), "useMetadata"),
@@ -82,16 +82,19 @@ def _product(outer: Affine, inner: Affine) -> Affine:
     return tuple(first), tuple(second)
 
 
-def _tiles(asset: Sdf.AssetPath, attribute: Usd.Attribute) -> tuple[tuple[int, ImageFile], ...]:
-    """Files of the asset as Ar resolves it; back slashes, which exporters on Windows leave, count as slashes."""
+def image_tiles(asset: Sdf.AssetPath, attribute: Usd.Attribute) -> tuple[tuple[int, ImageFile], ...]:
+    """Files of the asset as Ar resolves it; back slashes, which exporters on Windows leave, count as slashes.
+
+    Raises Unreadable where there is none.
+    """
     layer = attribute.GetPropertyStack()[0].layer
     path = asset.path.replace("\\", "/")
     if UsdShade.UdimUtils.IsUdimIdentifier(path):
         found = UsdShade.UdimUtils.ResolveUdimTilePaths(path, layer)
-        tiles = tuple((int(number), _image_file(file)) for file, number in found)
+        tiles = tuple((int(number), image_file(file)) for file, number in found)
     else:
         resolved = asset.resolvedPath or _resolved(layer, path)
-        tiles = ((FIRST_UDIM, _image_file(resolved)),) if resolved else ()
+        tiles = ((FIRST_UDIM, image_file(resolved)),) if resolved else ()
     if not tiles:
         raise Unreadable(f"no file {asset.path}")
     return tiles
@@ -101,7 +104,8 @@ def _resolved(layer: Sdf.Layer, path: str) -> str:
     return str(Ar.GetResolver().Resolve(Sdf.ComputeAssetPathRelativeToLayer(layer, path)))
 
 
-def _image_file(resolved: str) -> ImageFile:
+def image_file(resolved: str) -> ImageFile:
+    """The file that Ar resolved. Raises Unreadable for one that is missing in its package."""
     if not Ar.IsPackageRelativePath(resolved):
         return ImageFile(resolved)
     inside = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(resolved))

@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.scene import Unsupported
-from defshade_cli.usd.binding import Bindings
+from defshade_cli.usd.binding import Bindings, bound_to
 from defshade_cli.usd.copies import Copies, once
+from defshade_cli.usd.draw_mode import FULL, handed_down, mode_above, takes_effect
 from defshade_cli.usd.geometry import Surface, is_time_varying
 from defshade_cli.usd.instancing import Piece, Standing, place
 from defshade_cli.usd.kind import Kind
@@ -22,7 +23,8 @@ from defshade_cli.usd.light import is_light, read_light
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.native_instances import NativeInstances
 from defshade_cli.usd.point_instancer import has_varying_copies, read_point_instancer
-from defshade_cli.usd.xform import matrix
+from defshade_cli.usd.skel import Rig
+from defshade_cli.usd.xform import gf_matrix, matrix
 
 _PROTOTYPE_CHILDREN = Usd.PrimIsActive & Usd.PrimIsLoaded
 """Classes and overs count below a PointInstancer's prototype: the schema recommends them to hide it elsewhere."""
@@ -39,11 +41,11 @@ class Traversal:
         self.issues: dict[Unsupported, None] = {}
         self.dormant = False
         self._stage, self._memory, self._time, self._purposes = stage, memory, time, purposes
-        self._prototypes: dict[Sdf.Path, tuple[Piece, ...] | None] = {}
+        self._prototypes: dict[tuple[Sdf.Path, Sdf.Path | None], tuple[Piece, ...] | None] = {}
         memory.xforms.SetTime(time)
 
     def read_stage(self) -> tuple[Piece, ...]:
-        return self._read(self._stage.GetPseudoRoot().GetChildren(), Standing())
+        return self._read(self._stage.GetPseudoRoot().GetChildren(), Standing(draw_mode=FULL))
 
     def _read(
         self, roots: Iterable[Usd.Prim], above: Standing, predicate: object = Usd.PrimDefaultPredicate
@@ -57,20 +59,25 @@ class Traversal:
             kind, here = self._memory.kinds.of(prim), self._stand(prim, above)
             if kind is Kind.SHADING or here is None:
                 continue
+            if here.draw_mode not in (None, FULL) and takes_effect(prim):
+                pieces.append(self._stand_in(prim, here))
+                continue
             pieces.extend(self._own_pieces(prim, kind, here))
             if kind is Kind.POINT_INSTANCER:
                 pieces.extend(self._point_instances(prim, here))
-            elif prim.IsInstance():
+            elif prim.IsInstance() and not _is_rigged_from_above(prim, here):
                 instances.add(prim, here)
             else:
-                stack.extend((child, here) for child in reversed(prim.GetFilteredChildren(predicate)))
+                chosen = Usd.TraverseInstanceProxies(predicate) if here.rig else predicate
+                stack.extend((child, here) for child in reversed(prim.GetFilteredChildren(chosen)))
         pieces.extend(self._native_instances(instances))
         return tuple(pieces)
 
     def _stand(self, prim: Usd.Prim, above: Standing) -> Standing | None:
-        """What `prim` hands down, None where it is invisible; what is authored on other than Imageables is ignored."""
+        """What `prim` hands down, None where it is invisible; of other than Imageables only the draw mode counts."""
+        mode = handed_down(prim, above.draw_mode) if above.draw_mode else None
         if not prim.IsA(UsdGeom.Imageable):
-            return above
+            return above if mode == above.draw_mode else above._replace(draw_mode=mode)
         visibility = prim.GetAttribute(UsdGeom.Tokens.visibility)
         if visibility.Get(self._time) == UsdGeom.Tokens.invisible:
             self.dormant |= visibility.ValueMightBeTimeVarying()
@@ -79,7 +86,10 @@ class Traversal:
         root_from_prim = local if resets else local * above.root_from_prim
         purpose = prim.GetAttribute(UsdGeom.Tokens.purpose)
         own = str(purpose.Get()) if purpose.HasAuthoredValue() else above.purpose
-        return Standing(root_from_prim, resets or above.in_world, own)
+        here = above._replace(
+            root_from_prim=root_from_prim, in_world=resets or above.in_world, purpose=own, draw_mode=mode
+        )
+        return here.with_rig(prim) if prim.IsA(UsdSkel.Root) else here
 
     def _own_pieces(self, prim: Usd.Prim, kind: Kind, here: Standing) -> Iterator[Piece]:
         """What the prim itself is, whatever stands below it."""
@@ -88,8 +98,6 @@ class Traversal:
             self._report(prim, *(issue.reason for issue in issues))
             if light is not None:
                 yield self._piece(prim, here, light)
-        if mode := _draw_mode(prim):
-            self._report(prim, f"draw mode {mode}: the full geometry is drawn")
         if kind is Kind.GPRIM and here.purpose in (None, *self._purposes):
             yield from self._gprim(prim, here)
         elif kind is Kind.UNDRAWN:
@@ -97,16 +105,37 @@ class Traversal:
         elif kind is Kind.UNKNOWN:
             self._report(prim, f"no schema defines the type {prim.GetTypeName()}")
 
+    def _stand_in(self, prim: Usd.Prim, here: Standing) -> Piece:
+        """What is drawn in place of a model."""
+        surface = self._memory.stand_in(prim, here.draw_mode or FULL)
+        self.issues.update(dict.fromkeys(surface.issues))
+        return self._piece(prim, here, surface, {path: bound_to(path) for path in surface.groups})
+
     def _gprim(self, prim: Usd.Prim, here: Standing) -> Iterator[Piece]:
         surface = self._memory.surface(prim, self._time)
         if surface is None:
             self._report(prim, f"prims of type {prim.GetTypeName()} are not drawn")
             return
+        if surface.groups and here.rig:
+            surface, here = self._deformed(prim, surface, here, here.rig)
         self.issues.update(dict.fromkeys(surface.issues))
         if not surface.groups:
             self.dormant |= is_time_varying(prim)
             return
         yield self._piece(prim, here, surface, {path: self._memory.bindings(path) for path in surface.groups})
+
+    def _deformed(self, prim: Usd.Prim, rest: Surface, here: Standing, rig: Rig) -> tuple[Surface, Standing]:
+        """The surface as its skeleton bends it, standing where that does."""
+        deformer = self._memory.rigs.deformer(rig, here.on_stage(prim))
+        if deformer is None:
+            return rest, here
+        surface, skeleton_from_surface = deformer.at(rest, self._time)
+        if skeleton_from_surface is None:
+            return surface, here
+        root_from_skeleton, in_world = rig.place(deformer.skeleton, self._memory.xforms)
+        return surface, here._replace(
+            root_from_prim=gf_matrix(skeleton_from_surface) * root_from_skeleton, in_world=in_world
+        )
 
     def _piece(
         self, prim: Usd.Prim, here: Standing, content: Surface | Light, bindings: Mapping[str, Bindings] | None = None
@@ -125,11 +154,12 @@ class Traversal:
         )
 
     def _native_instances(self, instances: NativeInstances) -> Iterator[Piece]:
-        for prototype, placement in instances.placements(self._time):
-            path = prototype.GetPath()
-            if path not in self._prototypes:
-                self._prototypes[path] = self._read(prototype.GetChildren(), Standing())
-            yield from place(self._prototypes[path] or (), placement)
+        for sharing, first, placement in instances.placements(self._time):
+            key = sharing.prototype, sharing.animation
+            if key not in self._prototypes:
+                children = first.prim.GetPrototype().GetChildren()
+                self._prototypes[key] = self._read(children, first.here.inside(first.prim))
+            yield from place(self._prototypes[key] or (), placement)
         for prim, reasons in instances.issues.items():
             self._report(prim, *reasons)
 
@@ -145,20 +175,22 @@ class Traversal:
                 bindings=self._memory.bindings(prim.GetPath()),
                 in_world=here.in_world,
             )
-            yield from place(self._point_prototype(path, prim), placed)
+            yield from place(self._point_prototype(path, prim, here), placed)
 
-    def _point_prototype(self, path: Sdf.Path, instancer: Usd.Prim) -> tuple[Piece, ...]:
+    def _point_prototype(self, path: Sdf.Path, instancer: Usd.Prim, here: Standing) -> tuple[Piece, ...]:
         """A prototype's subtree with its root's own transform; of what stands above it only the purpose counts."""
-        if path not in self._prototypes:
+        key = path, None
+        if key not in self._prototypes:
             root = self._stage.GetPrimAtPath(path)
             if not root or not root.IsActive():
                 self._report(instancer, f"there is no prototype {self._memory.shown(path)}")
                 return ()
-            self._prototypes[path] = None
+            self._prototypes[key] = None
             above = UsdGeom.Imageable(root.GetParent()).ComputePurposeInfo()
-            standing = Standing(purpose=str(above.purpose) if above.isInheritable else None)
-            self._prototypes[path] = self._read([root], standing, _PROTOTYPE_CHILDREN)
-        pieces = self._prototypes[path]
+            purpose = str(above.purpose) if above.isInheritable else None
+            standing = Standing(purpose=purpose, draw_mode=mode_above(root), proxied=here.proxied)
+            self._prototypes[key] = self._read([root], standing, _PROTOTYPE_CHILDREN)
+        pieces = self._prototypes[key]
         if pieces is None:
             self._report(instancer, "it is part of its own prototype")
         return pieces or ()
@@ -175,9 +207,6 @@ def _copies_of(content: Surface | Light) -> Copies:
     return content.copies or once(content.display_color, content.display_opacity)
 
 
-def _draw_mode(prim: Usd.Prim) -> str | None:
-    """The draw mode that a model asks for, where it is not the full geometry."""
-    if not prim.HasAPI(UsdGeom.ModelAPI):
-        return None
-    mode = UsdGeom.ModelAPI(prim).GetModelDrawModeAttr().Get()
-    return None if mode in (UsdGeom.Tokens.inherited, UsdGeom.Tokens.default_) else str(mode)
+def _is_rigged_from_above(instance: Usd.Prim, here: Standing) -> bool:
+    """Is a SkelRoot above the instance? Its skeletons may deform each instance otherwise."""
+    return here.rig is not None and here.rig.root != here.on_stage(instance)

@@ -18,6 +18,11 @@ def matrix(gf: Gf.Matrix4d) -> Matrix:
     return np.array(gf, np.float64).T.copy()
 
 
+def gf_matrix(b_from_a: Matrix) -> Gf.Matrix4d:
+    """USD's "a to b"."""
+    return Gf.Matrix4d(b_from_a.T.tolist())
+
+
 def matrices(gf: Vt.Matrix4dArray | Sequence[Gf.Matrix4d]) -> NDArray[np.float64]:
     """(N, 4, 4) float64 likewise."""
     array = gf if isinstance(gf, Vt.Matrix4dArray) else Vt.Matrix4dArray(gf)

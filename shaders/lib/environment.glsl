@@ -1,4 +1,5 @@
 #include "lib/constants.glsl"
+#include "lib/render_space.glsl"
 
 uniform sampler2D sky;             // latitude-longitude, mipmapped
 uniform mat3 sky_from_relative;
@@ -11,7 +12,7 @@ vec2 latlong(vec3 d) {
 }
 
 vec3 sky_radiance(vec3 direction, float lod) {
-    return sky_emission * textureLod(sky, latlong(sky_from_relative * direction), lod).rgb;
+    return render_from_rec709(sky_emission * textureLod(sky, latlong(sky_from_relative * direction), lod).rgb);
 }
 
 // Ramamoorthi & Hanrahan 2001, "An Efficient Representation for Irradiance Environment Maps".
@@ -22,7 +23,7 @@ vec3 sky_irradiance(vec3 normal) {
     e += 1.092548 * (n.x * n.y * irradiance_sh[4] + n.y * n.z * irradiance_sh[5] + n.x * n.z * irradiance_sh[7]);
     e += 0.315392 * (3.0 * n.z * n.z - 1.0) * irradiance_sh[6];
     e += 0.546274 * (n.x * n.x - n.y * n.y) * irradiance_sh[8];
-    return sky_emission * max(e, 0.0);
+    return render_from_rec709(sky_emission * max(e, 0.0));
 }
 
 // The mip whose texel is as wide as the reflected GGX lobe at half its energy: tan of the half vector's angle is alpha.

@@ -17,6 +17,22 @@ vec3 shaping(Light light, float cosine, float sine) {
     return cone * mix(light.focus_tint, vec3(1.0), focus);
 }
 
+#ifdef IES
+uniform sampler2DArray ies_tables; // candela by horizontal and vertical angle, a layer a profile
+
+const uint NO_IES = 0xffffffffu;
+
+// UsdLuxShapingAPI's profile: polar coordinates of the direction `l` that light comes from, `angle` off the axis.
+float ies(Light light, vec3 l, float angle) {
+    if (light.ies_table == NO_IES) return 1.0;
+    float vertical = clamp(light.ies_vertical.x * angle + light.ies_vertical.y, 0.0, PI) / PI;
+    float horizontal = fract(atan(dot(l, light.up), dot(l, light.right)) / (2.0 * PI));
+    vec2 size = vec2(textureSize(ies_tables, 0).xy);
+    vec2 at = (vec2(horizontal, vertical) * (size - 1.0) + 0.5) / size;
+    return light.ies_scale * textureLod(ies_tables, vec3(at, float(light.ies_table)), 0.0).r;
+}
+#endif
+
 // Emission of the light's shape, or of a point on it, over its greatest.
 float profile(Light light, vec3 emission_direction) {
     if (light.profile == PROFILE_COSINE) return max(dot(light.facing, emission_direction), 0.0);
@@ -50,6 +66,10 @@ vec3 irradiance_from(Light light, vec3 position, out vec3 l) {
     if (distance_squared >= light.reach * light.reach) return vec3(0.0);
     float cosine = dot(-l, light.axis);
     float sine = length(cross(l, light.axis));
-    return light.intensity * shaping(light, cosine, sine) * (profile(light, -l) / distance_squared);
+    vec3 emitted = light.intensity * shaping(light, cosine, sine) * (profile(light, -l) / distance_squared);
+#ifdef IES
+    emitted *= ies(light, l, atan(sine, cosine));
+#endif
+    return emitted;
 #endif
 }

@@ -16,6 +16,7 @@ struct Instance {
     vec3 display_color;
     float display_opacity;
     float handedness;          // -1 where the placement mirrors
+    uint link_set;
 };
 
 struct Material {
@@ -31,8 +32,10 @@ struct Material {
     float opacity_threshold;
     uint use_specular_workflow;
     uint uses_display_color;
+    uint one_sided;
     uint first_input;          // of its textures
     uint input_count;
+    float occlusion;
 };
 
 struct TextureInput {
@@ -71,6 +74,12 @@ struct Light {
     uint shadow_count;         // 0: casts none
     uint is_sky;               // one of the few directions that stand for a dome
     float extent;              // area that the point stands for; a distant light's solid angle; 0 for a point
+    vec3 right;                // unit, the light's X and Y: what an IES profile's horizontal angle is measured from
+    float ies_scale;           // of its candela
+    vec3 up;
+    uint ies_table;            // its layer; NO_IES for none
+    uint first_link;           // bits of the link sets that it lights: lib/linking.glsl
+    vec2 ies_vertical;         // the profile is read at x * angle + y radians
 };
 
 struct ShadowMap {

@@ -12,22 +12,16 @@ uint cube_face(vec3 direction) {
     return direction.z >= 0.0 ? 4u : 5u;
 }
 
-// Of the four texels around a receiver one may have its centre √2 texels aside, in the plane of the map. Lifting the
-// receiver along its normal n by √2 · texel · |n in that plane| clears exactly that on a flat surface, wherever the light
-// comes from; a little towards the light clears float32 rounding.
-const float NORMAL_OFFSET = 1.45;
+// Towards the light, in texels: clears float32 rounding. The maps' own depth offset keeps surfaces from shadowing themselves.
 const float LIGHT_OFFSET = 0.02;
 
 // Share of the light that reaches a relative position: the four nearest texels, bilinearly.
-float visibility(Light light, vec3 position, vec3 normal, vec3 l) {
+float visibility(Light light, vec3 position, vec3 l) {
     if (light.shadow_count == 0u) return 1.0;
     uint face = light.shadow_count == 6u ? cube_face(-l) : 0u;
     ShadowMap map = shadow_maps[light.first_shadow + face];
     float texel = map.texel * (map.clip_from_relative * vec4(position, 1.0)).w; // in scene units at the receiver
-    mat4 m = map.clip_from_relative;
-    float sine = length(cross(normal, normalize(vec3(m[0].z, m[1].z, m[2].z))));
-    vec3 lifted = position + texel * (NORMAL_OFFSET * sine * normal + LIGHT_OFFSET * l);
-    vec4 clip = map.clip_from_relative * vec4(lifted, 1.0);
+    vec4 clip = map.clip_from_relative * vec4(position + texel * LIGHT_OFFSET * l, 1.0);
     vec3 ndc = clip.xyz / clip.w;
     vec2 within = (0.5 + 0.5 * vec2(ndc.x, -ndc.y)) * map.resolution;
     within = clamp(within, 0.5, map.resolution - 0.5);
@@ -38,7 +32,7 @@ float visibility(Light light, vec3 position, vec3 normal, vec3 l) {
     return mix(row.x, row.y, t.y);
 }
 #else
-float visibility(Light light, vec3 position, vec3 normal, vec3 l) {
+float visibility(Light light, vec3 position, vec3 l) {
     return 1.0;
 }
 #endif

@@ -11,6 +11,9 @@ struct Surface {
     vec3 f90;
     float clearcoat;
     float clearcoat_roughness;
+#ifdef PLANE_LINKS
+    uint link_set;
+#endif
 };
 
 // Reflectance at normal incidence of a dielectric in air.

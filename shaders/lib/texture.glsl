@@ -1,4 +1,5 @@
 #include "lib/records.glsl"
+#include "lib/tangent.glsl"
 
 layout(std430, binding = 5) readonly buffer TextureInputBlock { TextureInput texture_inputs[]; };
 layout(std430, binding = 6) readonly buffer TileBlock { Tile tiles[]; };
@@ -10,11 +11,6 @@ const uint WRAP_MIRROR = 3u;
 const uint WRAP_UDIM = 4u;
 const uint NO_GROUP = 0xffffffffu;
 const uint ALL_CHANNELS = 4u;
-
-// Texture coordinates and how they change from pixel to pixel: taken before any branch, where derivatives are defined.
-struct Coordinates {
-    vec2 at, dx, dy;
-};
 
 #include "generated/textures.glsl"
 
@@ -62,16 +58,12 @@ vec4 read_texture(TextureInput t, Coordinates c) {
     return t.channel == ALL_CHANNELS ? value : vec4(value[t.channel]);
 }
 
-// The frame that normal maps are baked in: MikkTSpace's, from the derivatives of position and coordinates. Solving for
-// dP/du and dP/dv makes it indifferent to mirrored coordinates and to the direction of the screen's axes.
+// The frame that normal maps are baked in: MikkTSpace's.
 vec3 from_tangent_space(vec3 tangent_normal, vec3 n, vec3 dPdx, vec3 dPdy, Coordinates c) {
-    float determinant = c.dx.x * c.dy.y - c.dy.x * c.dx.y;
-    vec3 t = (dPdx * c.dy.y - dPdy * c.dx.y) * sign(determinant);
-    vec3 dPdv = (dPdy * c.dx.x - dPdx * c.dy.x) * sign(determinant);
-    t -= n * dot(n, t);
-    if (dot(t, t) == 0.0 || dot(tangent_normal, tangent_normal) == 0.0) return n;
-    t = normalize(t);
-    vec3 b = cross(n, t) * (dot(cross(n, t), dPdv) < 0.0 ? -1.0 : 1.0);
+    mat2x3 along = along_coordinates(dPdx, dPdy, c);
+    vec3 t = tangent_across(n, along[0]);
+    if (t == vec3(0.0) || dot(tangent_normal, tangent_normal) == 0.0) return n;
+    vec3 b = cross(n, t) * (dot(cross(n, t), along[1]) < 0.0 ? -1.0 : 1.0);
     return normalize(mat3(t, b, n) * tangent_normal);
 }
 

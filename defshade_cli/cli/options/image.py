@@ -10,8 +10,7 @@ import click
 from defshade_cli import settings
 from defshade_cli.cli.options.option import Function, Option
 from defshade_cli.cli.options.sampling import sampling_options
-from defshade_cli.cli.types import Finite, Names, Size
-from defshade_cli.image.layers import LAYERS
+from defshade_cli.cli.types import Crop, Finite, Layers, Size
 from defshade_cli.settings import RenderSettings
 
 _RENDER = RenderSettings()
@@ -34,12 +33,20 @@ def image_options(layers: Sequence[str]) -> list[Function]:
             help="Width in pixels; the height follows the camera's aspect.",
         ),
         option(
+            "--crop",
+            type=Crop(),
+            metavar="WxH+X+Y",
+            help="Part of the image to render: WxH pixels from X, Y on, from the top left; what lies beyond the image "
+            "is overscan. The default is the stage's data window.",
+        ),
+        option(
             "--layers",
-            type=Names("layer", tuple(LAYERS)),
+            type=Layers(),
             metavar="NAMES",
             default=tuple(layers),
             default_text=",".join(layers),
-            help="Layers to write, with commas between, of those listed below; or 'all'.",
+            help="Layers to write, with commas between, of those listed below or by their names in Hydra, "
+            "Arnold and Blender; 'all' for all that are listed.",
         ),
         *sampling_options(),
         *_shading_options(),
@@ -83,6 +90,19 @@ def _shading_options() -> list[Function]:
             default_text=str(_RENDER.complexity),
             help="Refinement of subdivision surfaces: auto goes by their size in the image; low draws their cages, "
             "medium, high and veryhigh one, two and three levels.",
+        ),
+        option(
+            "--render-space",
+            metavar="NAME",
+            help="Scene-linear colour space that light and reflectance meet in, and that EXR holds: lin_rec709, ACEScg "
+            "or another of the OCIO config's. The default is the stage's render settings, then lin_rec709.",
+        ),
+        option(
+            "--ocio",
+            metavar="CONFIG",
+            default=_RENDER.ocio,
+            default_text="$OCIO, else ocio://default",
+            help="OCIO config: a file, or ocio://NAME for one that OpenColorIO has built in.",
         ),
         option(
             "--exposure",

@@ -62,4 +62,5 @@ def output_options(name: str) -> list[Function]:
         option("--verify", is_flag=True, help="Read each file back and compare, before it takes its name."),
         option("--display", metavar="NAME", help="OCIO display for formats such as PNG, not for EXR."),
         option("--view", metavar="NAME", help="OCIO view of the display."),
+        option("--look", metavar="NAME", help="OCIO look, before the view."),
     ]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 
-from defshade_cli.image.colour import RENDER_SPACE, Pixels
+from defshade_cli.image.colour import Pixels
 from defshade_cli.image.encoders.sink import bounded, make_spec, opened, set_attributes
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import BEAUTY, LAYERS, MAIN_PART
@@ -78,7 +78,7 @@ def _spec(film: Film, names: tuple[str, ...], halves: set[str], compression: Com
     spec.channelnames = channels
     if len(set(types)) > 1:
         spec.channelformats = tuple(oiio.TypeDesc(kind) for kind in types)
-    spec.set_colorspace(RENDER_SPACE if any(LAYERS[name].is_color for name in names) else "data")
+    spec.set_colorspace(film.render_space.interop_id if any(LAYERS[name].is_color for name in names) else "data")
     spec.attribute("compression", _lossless_for_data(compression, names))
     set_attributes(spec, exr_attributes(film, names))
     return spec

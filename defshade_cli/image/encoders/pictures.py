@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from defshade_cli.image.colour import display_space, picture
+from defshade_cli.image.colour import display_transform, picture
 from defshade_cli.image.encoders.sink import bounded, make_spec, opened, set_attributes
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import LAYERS
@@ -57,11 +57,12 @@ def write_picture(film: Film, name: str, output: OutputSettings, path: Path) -> 
     """Write the layer `name` as it looks. Raises OSError with the reason."""
     form, layer = PICTURES[path.suffix.lower()], LAYERS[name]
     pixels = bounded(name, film.layers[name], half=layer.is_color)
-    shown = picture(layer, pixels, alpha=form.alpha, display=output.display, view=output.view)
+    transform = display_transform(output.display, output.view, output.look, film.render_space)
+    shown = picture(layer, pixels, transform, alpha=form.alpha)
     bits = output.bits or form.bits[0]
     spec = make_spec(film, shown.shape[-1], f"uint{bits}")
     if layer.is_color:
-        spec.set_colorspace(display_space(output.display, output.view))
+        spec.set_colorspace(transform.encoding)
     for hint, value in (*form.hints, *_hints(dithered=output.dither and layer.is_color and bits == 8)):
         spec.attribute(hint, value)
     set_attributes(spec, text_attributes(film))

@@ -1,0 +1,21 @@
+"""The output layers: one table from which --layers, the docs, `inspect` and the EXR metadata come.
+
+table   the rows        layer   what a row says
+names   what other renderers call them, and how a request becomes rows
+"""
+
+from defshade_cli.image.layers.layer import BEAUTY, MAIN_PART, SCENE_LINEAR, SCENE_UNITS, UNIT_VECTOR, Layer
+from defshade_cli.image.layers.names import ALIASES, LAYERS, in_order, resolve
+
+__all__ = [
+    "ALIASES",
+    "BEAUTY",
+    "LAYERS",
+    "MAIN_PART",
+    "SCENE_LINEAR",
+    "SCENE_UNITS",
+    "UNIT_VECTOR",
+    "Layer",
+    "in_order",
+    "resolve",
+]

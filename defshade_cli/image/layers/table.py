@@ -1,0 +1,61 @@
+"""The table of output layers."""
+
+from __future__ import annotations
+
+from math import inf
+
+from defshade_cli.image.layers.layer import BEAUTY, SCENE_LINEAR, SCENE_UNITS, UNIT_VECTOR, Layer
+
+_RGBA, _XYZ = ("R", "G", "B", "A"), ("X", "Y", "Z")
+
+
+def _color(name: str, source: str, summary: str) -> Layer:
+    return Layer(name, ("R", "G", "B"), SCENE_LINEAR, "render", source, 0.0, False, summary)
+
+
+def _scalar(name: str, source: str, summary: str, first: int = 0, background: float = 0.0) -> Layer:
+    return Layer(name, ("Y",), "0..1", "none", source, background, False, summary, first)
+
+
+def _range(name: str, summary: str) -> Layer:
+    return Layer(name, ("Z",), SCENE_UNITS, "camera", "depth", inf, False, summary)
+
+
+def _point(name: str, space: str, summary: str) -> Layer:
+    return Layer(name, _XYZ, SCENE_UNITS, space, "depth", 0.0, False, summary)
+
+
+def _direction(name: str, space: str, source: str, summary: str) -> Layer:
+    return Layer(name, _XYZ, UNIT_VECTOR, space, source, 0.0, False, summary)
+
+
+def _statistic(name: str, unit: str, summary: str) -> Layer:
+    return Layer(name, ("Y",), unit, "none", "lighting", 0.0, True, summary)
+
+
+ROWS: dict[str, Layer] = {
+    layer.name: layer
+    for layer in (
+        Layer(BEAUTY, _RGBA, SCENE_LINEAR, "render", "lighting", 0.0, True, "the lit image, alpha premultiplied"),
+        Layer("alpha", ("A",), "0..1", "none", "coverage", 0.0, True, "the beauty's coverage by itself"),
+        _range("depth", "planar: distance along the camera's axis"),
+        _range("distance", "radial: distance from the camera's position"),
+        _point("position", "world", "the point that the pixel's centre sees"),
+        _point("Peye", "camera", "the same point: +X right, +Y up, −Z ahead"),
+        _direction("normal", "world", "normal", "shading normal, facing the camera"),
+        _direction("Neye", "camera", "normal", "shading normal in camera space"),
+        _direction("geometricNormal", "world", "facet", "normal of the triangle, facing the camera"),
+        _direction("tangent", "world", "tangent", "where u grows, across the shading normal; 0 without uv"),
+        Layer("uv", ("U", "V"), "texture coordinates", "none", "uv", 0.0, False, "primvar st, else the first there is"),
+        _statistic("variance", "scene-linear²", "variance of the beauty's luminance, as a mean of samples"),
+        _statistic("sampleCount", "samples", "samples of the beauty"),
+        _color("albedo", "base", "diffuse colour of the material before metallic darkens it"),
+        _scalar("metallic", "base", "metalness", first=3),
+        _scalar("roughness", "normal", "perceptual roughness; GGX alpha is its square", first=3),
+        _color("specularF0", "specular", "reflectance at normal incidence"),
+        _color("emission", "emission", "emitted radiance"),
+        _scalar("clearcoat", "clearcoat", "amount of clearcoat"),
+        _scalar("clearcoatRoughness", "clearcoat", "perceptual roughness of the clearcoat", first=1),
+        _scalar("occlusion", "occlusion", "the material's occlusion; direct light does not see it", background=1.0),
+    )
+}

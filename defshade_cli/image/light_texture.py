@@ -1,0 +1,49 @@
+"""Images that lights shine through, from files."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from defshade_cli.image.texture import Source, TexelImage, load_images
+from defshade_cli.scene.light import Light, RectLight
+from defshade_cli.scene.radiance_map import RadianceMap
+from defshade_cli.scene.texture import ImageFile
+
+log = logging.getLogger("defshade")
+
+
+def with_texture(light: Light) -> Light:
+    """The light with its image in memory; even, with a warning, where it cannot be read."""
+    if not isinstance(light, RectLight) or light.texture is None or light.radiance_map is not None:
+        return light
+    found = read_radiance_map(light.texture)
+    if found is None:
+        log.warning("%s: its texture cannot be read; the light is even", light.path)
+    return replace(light, radiance_map=found)
+
+
+def read_radiance_map(file: ImageFile) -> RadianceMap | None:
+    """The image, scene-linear Rec. 709; read once as long as the file does not change. None, logged, if it fails."""
+    path = Path(file.path)
+    return _read(file, path.stat().st_mtime_ns if path.exists() else 0)
+
+
+@lru_cache(maxsize=8)
+def _read(file: ImageFile, _changed: int) -> RadianceMap | None:
+    source = Source(file, "auto")
+    images = load_images([source])
+    return RadianceMap(_linear(images[source])) if source in images else None
+
+
+def _linear(image: TexelImage) -> np.ndarray:
+    """(H, W, 3) row 0 at the top, none negative."""
+    texels = image.texels.astype(np.float32) / (255.0 if image.texels.dtype == np.uint8 else 1.0)
+    colors = texels[::-1, :, :3] if texels.shape[2] >= 3 else np.repeat(texels[::-1, :, :1], 3, axis=2)
+    if image.srgb:
+        colors = np.where(colors > 0.04045, ((colors + 0.055) / 1.055) ** 2.4, colors / 12.92)
+    return np.maximum(colors, 0.0)

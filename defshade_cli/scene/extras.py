@@ -1,0 +1,18 @@
+"""What of a stage is read only because a layer asks for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Extras:
+    """Nothing of this changes the lit image.
+
+    occlusion: of materials.
+    """
+
+    occlusion: bool = False
+
+
+NO_EXTRAS = Extras()

@@ -1,0 +1,58 @@
+"""The data window: the part of an image that is rendered, in whole or beyond it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil
+
+from defshade_cli.errors import UsageError
+from defshade_cli.spaces import Window
+
+WHOLE_IMAGE = (0.0, 0.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class DataWindow:
+    """Pixels from (x, y) on, counted from the top left corner of the display window, which they may leave.
+
+    x, y: of the first pixel, y down.  width, height: in pixels.
+    """
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+    def __post_init__(self) -> None:
+        if min(self.width, self.height) < 1:
+            raise UsageError(f"a data window of {self.width}x{self.height} has no pixels")
+
+    @property
+    def origin(self) -> tuple[int, int]:
+        return self.x, self.y
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return self.width, self.height
+
+    def of(self, window: Window, display: tuple[int, int]) -> Window:
+        """The part of a camera's (left, right, bottom, top) that these pixels of a `display` see."""
+        left, right, bottom, top = window
+        across, down = (right - left) / display[0], (top - bottom) / display[1]
+        return (
+            left + self.x * across,
+            left + (self.x + self.width) * across,
+            top - (self.y + self.height) * down,
+            top - self.y * down,
+        )
+
+
+def from_ndc(ndc: tuple[float, float, float, float], display: tuple[int, int]) -> DataWindow:
+    """The pixels whose centres lie in (xmin, ymin, xmax, ymax), 0..1 over the display window, y up.
+
+    UsdRenderSettingsBase, dataWindowNDC. Raises UsageError where there are none.
+    """
+    xmin, ymin, xmax, ymax = ndc
+    columns = [ceil(x * display[0] - 0.5) for x in (xmin, xmax)]
+    rows = [ceil((1.0 - y) * display[1] - 0.5) for y in (ymax, ymin)]
+    return DataWindow(columns[0], rows[0], columns[1] - columns[0], rows[1] - rows[0])

@@ -1,0 +1,123 @@
+"""Draw modes: models that are replaced by a box, by their axes or by textured cards, as UsdGeomModelAPI says.
+
+model:drawMode       inherited down the model hierarchy
+model:applyDrawMode  where it takes effect: on components, unless they say no, and on other models that say yes
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Kind, Sdf, Usd, UsdGeom
+
+from defshade_cli.scene.material import Material
+from defshade_cli.scene.scene import Unsupported
+from defshade_cli.usd.cards import UNTEXTURED, read_card_material, read_cards
+from defshade_cli.usd.geometry import Surface
+from defshade_cli.usd.material import ReadMaterial
+from defshade_cli.usd.polygons import Polygons
+from defshade_cli.usd.subsets import Faces
+
+FULL = "default"
+"""The mode that draws the model itself."""
+
+_COLOR = UsdGeom.Tokens.modelDrawModeColor
+_NO_COLOR = (0.18, 0.18, 0.18)
+"""The schema's, for models to which it is not applied."""
+
+_LINE_WIDTH = 0.008
+"""Of the diagonal of what is drawn in lines, which in a viewer are a pixel wide."""
+
+_BOX_FACES = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
+_BITS = np.array([[corner >> 2 & 1, corner >> 1 & 1, corner & 1] for corner in range(8)])
+_EDGES = np.array([[low, low | bit] for bit in (1, 2, 4) for low in range(8) if not low & bit])
+_AXES = np.array([[0, 4], [0, 2], [0, 1]])
+
+
+def handed_down(prim: Usd.Prim, above: str) -> str | None:
+    """The draw mode of `prim`, whose parent hands down `above`; None where it is no model."""
+    return str(UsdGeom.ModelAPI(prim).ComputeModelDrawMode(above)) if prim.IsModel() else None
+
+
+def mode_above(prim: Usd.Prim) -> str:
+    """What the parents of `prim` hand down."""
+    return str(UsdGeom.ModelAPI(prim.GetParent()).ComputeModelDrawMode())
+
+
+def takes_effect(prim: Usd.Prim) -> bool:
+    """Is `prim` a model that its draw mode replaces?"""
+    if not prim.IsModel():
+        return False
+    authored = UsdGeom.ModelAPI(prim).GetModelApplyDrawModeAttr()
+    if authored.HasAuthoredValue():
+        return bool(authored.Get())
+    return Kind.Registry.IsA(Usd.ModelAPI(prim).GetKind(), Kind.Tokens.component)
+
+
+class StandIns:
+    """What is drawn in place of models; the boxes of their geometry are kept."""
+
+    def __init__(self) -> None:
+        purposes = [UsdGeom.Tokens.default_, UsdGeom.Tokens.proxy, UsdGeom.Tokens.render]
+        self._boxes = UsdGeom.BBoxCache(Usd.TimeCode.EarliestTime(), purposes, useExtentsHint=True)
+
+    def read(self, prim: Usd.Prim, mode: str) -> Surface:
+        """The stand-in in the model's space. Its groups are bound to properties of the prim, see read_material."""
+        path, issues = str(prim.GetPath()), list[str]()
+        group: NDArray[np.intp] | None = None
+        names: tuple[str, ...] = (_COLOR,)
+        if mode == UsdGeom.Tokens.origin:
+            polygons = _lines(np.array([[0.0] * 3, [1.0] * 3]), _AXES)
+        else:
+            box = self._box(prim)
+            if box is None:
+                return _surface(path, (), _lines(np.zeros((2, 3)), _AXES[:0]), None, ["it has no bounds to draw"])
+            if mode == UsdGeom.Tokens.cards:
+                polygons, names, group = read_cards(prim, box, issues)
+            else:
+                polygons = _lines(box, _EDGES)
+        return _surface(path, names, polygons, group, issues)
+
+    def _box(self, prim: Usd.Prim) -> NDArray[np.float64] | None:
+        found = self._boxes.ComputeUntransformedBound(prim).ComputeAlignedRange()
+        return None if found.IsEmpty() else np.array([found.GetMin(), found.GetMax()])
+
+
+def read_material(stage: Usd.Stage, path: Sdf.Path, shown_as: str) -> ReadMaterial:
+    """The material of a stand-in, which is named by the property that it is from.
+
+    A card's by its texture; lines and cards without texture have the draw mode's colour, and lines shine by themselves.
+    """
+    prim = stage.GetPrimAtPath(path.GetPrimPath())
+    r, g, b = UsdGeom.ModelAPI(prim).GetModelDrawModeColorAttr().Get() or _NO_COLOR
+    color = (float(r), float(g), float(b))
+    if path.name == UNTEXTURED:
+        return ReadMaterial(Material(shown_as, color))
+    if path.name != _COLOR:
+        return read_card_material(prim.GetAttribute(path.name), color, shown_as)
+    black = (0.0, 0.0, 0.0)
+    return ReadMaterial(Material(shown_as, black, color, use_specular_workflow=True, specular_color=black))
+
+
+def _surface(
+    path: str, names: tuple[str, ...], polygons: Polygons, group: NDArray[np.intp] | None, issues: list[str]
+) -> Surface:
+    groups = tuple(f"{path}.{name}" for name in names)
+    faces = Faces(groups or (path,), group)
+    reported = tuple(Unsupported(path, issue) for issue in issues)
+    return Surface(path, polygons, None, faces, groups, False, None, None, None, reported)
+
+
+def _lines(box: NDArray[np.float64], edges: NDArray[np.intp]) -> Polygons:
+    """Edges (E, 2) between corners of a box as thin bars; corners are numbered by the bits of x, y and z."""
+    corners = np.where(_BITS, box[1], box[0])
+    half = 0.5 * _LINE_WIDTH * float(np.linalg.norm(box[1] - box[0]))
+    low, high = corners[edges[:, 0]] - half, corners[edges[:, 1]] + half
+    points = np.where(_BITS, high[:, None], low[:, None]).reshape(-1, 3)
+    faces = (_BOX_FACES + 8 * np.arange(len(edges))[:, None, None]).reshape(-1, 4)
+    return Polygons(
+        points=points.astype(np.float32),
+        counts=np.full(len(faces), 4),
+        indices=faces.ravel(),
+        faces=np.arange(len(faces), dtype=np.int32),
+    )

@@ -1,0 +1,15 @@
+#include "lib/tangent.glsl"
+
+// What only layers show of a pixel. Members whose plane is not there are not set.
+struct Detail {
+    vec3 facet;                // unit, facing the camera
+    vec3 tangent;              // unit, or 0
+    vec2 uv;
+    float occlusion;
+};
+
+// Normal of the triangle. Pixels run right and down, so what is seen always turns the same way.
+vec3 facet_normal(vec3 dPdx, vec3 dPdy) {
+    vec3 n = cross(dPdy, dPdx);
+    return dot(n, n) == 0.0 ? vec3(0.0) : normalize(n);
+}
