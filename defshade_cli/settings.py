@@ -89,6 +89,7 @@ class RenderSettings:
         MOST_SAMPLES where the error or the time ends the render.
     max_error: relative standard error to render to: passes/convergence.py.
     time_limit: seconds to draw a frame in; the sample that passes them is finished.
+    cryptomatte_levels: ids a pixel of a Cryptomatte holds, the greatest coverage first; even.
     filter: the samples of a pixel fall by it.  filter_width: pixels from end to end; None for the filter's own.
     render_space: the scene-linear colour space of the image, by a name that the OCIO config knows; None follows the
         stage's RenderSettings, then linear Rec.709.  ocio: the config, a file or ocio://NAME; empty for $OCIO's.
@@ -107,6 +108,7 @@ class RenderSettings:
     time_limit: float | None = None
     filter: Filter = "box"
     filter_width: float | None = None
+    cryptomatte_levels: int = 6
     layout: Layout = "float"
     shading: Shading = "preview-surface"
     layers: tuple[str, ...] = ("beauty",)

@@ -26,6 +26,9 @@ in vec4 uv;
 #ifdef LAYER_UV
 in vec2 layer_uv;
 #endif
+#ifdef DRAW_ROW
+flat in uint visible_row;
+#endif
 
 Surface surface_of(Material material, vec3 normal) {
     Surface s;
@@ -60,6 +63,9 @@ Detail detail_of(vec3 normal) {
 #ifdef PLANE_TANGENT
     Coordinates c = Coordinates(layer_uv, dFdx(layer_uv), dFdy(layer_uv));
     d.tangent = tangent_across(normal, along_coordinates(dFdx(position_relative), dFdy(position_relative), c)[0]);
+#endif
+#ifdef PLANE_VISIBLE
+    d.visible = uvec2(visible_row + 1u, uint(gl_PrimitiveID));
 #endif
     return d;
 }

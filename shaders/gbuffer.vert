@@ -14,6 +14,10 @@ in vec4 vertex_uv;             // two sets
 in vec2 vertex_layer_uv;
 out vec2 layer_uv;
 #endif
+#ifdef DRAW_ROW
+in uint draw_row;
+flat out uint visible_row;
+#endif
 in uvec2 draw;                 // instance, material
 
 out vec3 normal_relative;
@@ -54,6 +58,9 @@ void main() {
 #endif
 #ifdef LAYER_UV
     layer_uv = vertex_layer_uv;
+#endif
+#ifdef DRAW_ROW
+    visible_row = draw_row;
 #endif
     gl_Position = view.clip_from_relative * vec4(position.xyz, 1.0);
 }

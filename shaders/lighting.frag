@@ -37,14 +37,10 @@ void main() {
     vec3 irradiance = irradiance_from(lights[light_index], position, l);
     if (irradiance == vec3(0.0)) discard;
     Surface surface = read_planes(pixel);
-<<<<<<< HEAD
-    irradiance *= visibility(lights[light_index], position, l);
-=======
 #ifdef PLANE_LINKS
     if (!is_linked(lights[light_index].first_link, surface.link_set)) discard;
 #endif
-    irradiance *= visibility(lights[light_index], position, surface.normal, l);
->>>>>>> main
+    irradiance *= visibility(lights[light_index], position, l);
     float widening = patch_alpha_squared(lights[light_index], position, l);
     if (widening > 0.0) {
         surface.roughness = widened_roughness(surface.roughness, widening);

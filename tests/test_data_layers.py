@@ -156,7 +156,7 @@ def test_a_data_layer_costs_its_own_plane(name: str) -> None:
 def test_an_unasked_layer_costs_nothing() -> None:
     plan = plan_of(scene([sphere()], [sun()]), "beauty")
     assert [plane.name for plane in plan.planes] == ["base", "normal"] and not plan.data_planes and not plan.data_pass
-    assert not plan.reads("POSITION") and not plan.reads("LAYER_UV")
+    assert not plan.inputs
 
 
 def test_all_layers_at_once_need_more_than_one_framebuffer(pipeline: Pipeline) -> None:

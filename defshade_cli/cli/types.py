@@ -162,6 +162,21 @@ class PrimPaths(click.ParamType):
         return tuple(dict.fromkeys(paths))
 
 
+class Ranks(click.IntRange):
+    """Ranks of a Cryptomatte, which stand two by two in its channels."""
+
+    def __init__(self) -> None:
+        from defshade_cli.image.layers.layer import MOST_RANKS
+
+        super().__init__(2, MOST_RANKS)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        ranks = int(super().convert(value, param, ctx))
+        if ranks % 2:
+            self.fail(f"{ranks} is odd: ranks stand two by two", param, ctx)
+        return ranks
+
+
 class Threshold(click.ParamType):
     """`flip=0.05` → ("flip", 0.05); a bare number is for the first of `metrics`."""
 

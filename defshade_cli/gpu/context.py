@@ -28,6 +28,7 @@ _REQUIRED_VERSION = 450
 _UPPER_LEFT, _ZERO_TO_ONE = 0x8CA2, 0x935F
 _TEXTURE_2D, _DEPTH_COMPONENT, _DEPTH_COMPONENT32F, _FLOAT = 0x0DE1, 0x1902, 0x8CAC, 0x1406
 _TEXTURE_2D_ARRAY, _SRGB8_ALPHA8, _RGBA, _UNSIGNED_BYTE = 0x8C1A, 0x8C43, 0x1908, 0x1401
+_COLOR, _ZEROS = 0x1800, (ctypes.c_uint * 4)()
 DEPTH_CLAMP = 0x864F
 
 Releasable = TypeVar("Releasable", bound=Any)
@@ -128,6 +129,11 @@ class Gpu:
             bind(_TEXTURE_2D_ARRAY, array.glo)
             specify(_TEXTURE_2D_ARRAY, 0, _SRGB8_ALPHA8, *size, 0, _RGBA, _UNSIGNED_BYTE, None)
         return array
+
+    def clear_integers(self, attachment: int) -> None:
+        """Zero a colour attachment of unsigned integers of the bound framebuffer: glClear leaves such undefined."""
+        clear = self._entry_point("glClearBufferuiv", ctypes.c_uint, ctypes.c_int, ctypes.c_void_p)
+        clear(_COLOR, attachment, ctypes.addressof(_ZEROS))
 
     def _entry_point(self, name: str, *arguments: Any) -> Callable[..., None]:
         address = self._get_address(name.encode())

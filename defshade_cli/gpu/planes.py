@@ -21,7 +21,7 @@ MOST_TARGETS = 8
 class Encoding:
     """One plane in one layout.
 
-    dtype: moderngl's, f1 for 8-bit unorm, f2 half, f4 float.
+    dtype: moderngl's, f1 for 8-bit unorm, f2 half, f4 float, u4 for integers.
     write: GLSL value from `Surface s` and `Detail d`.
     read: GLSL statements that set members of `s` from `vec4 t`; empty for what the lighting does not read.
     """
@@ -63,9 +63,9 @@ def _always(_: Material) -> bool:
     return True
 
 
-def _detail(name: str, components: int, write: str, *inputs: str) -> Plane:
+def _detail(name: str, components: int, write: str, *inputs: str, dtype: str = "f4") -> Plane:
     """A plane that only layers show."""
-    return Plane(name, components, _encodings(write, "", narrow="f4"), lambda _: False, inputs)
+    return Plane(name, components, _encodings(write, "", narrow=dtype, wide=dtype), lambda _: False, inputs)
 
 
 _BASE_READ = "s.metallic = t.a;"
@@ -139,6 +139,7 @@ PLANES: tuple[Plane, ...] = (
     _detail("tangent", 4, "vec4(d.tangent, 0.0)", "POSITION", "LAYER_UV"),
     _detail("uv", 2, "vec4(d.uv, 0.0, 0.0)", "LAYER_UV"),
     _detail("occlusion", 1, "vec4(d.occlusion)"),
+    _detail("visible", 2, "uvec4(d.visible, 0u, 0u)", "DRAW_ROW", dtype="u4"),
 )
 
 
@@ -156,7 +157,9 @@ def named_planes(names: Iterable[str]) -> tuple[Plane, ...]:
 
 def write_source(planes: Sequence[Plane], layout: Layout) -> str:
     """GLSL: the outputs, and `void write_planes(Surface s, Detail d)`."""
-    outputs = [f"layout(location = {i}) out vec4 plane_{p.name};" for i, p in enumerate(planes)]
+    integers = integer_attachments(planes, layout)
+    types = ["uvec4" if i in integers else "vec4" for i in range(len(planes))]
+    outputs = [f"layout(location = {i}) out {types[i]} plane_{p.name};" for i, p in enumerate(planes)]
     body = [f"    plane_{p.name} = {p.encodings[layout].write};" for p in planes]
     return "\n".join(
         ['#include "lib/encode.glsl"', *outputs, "", "void write_planes(Surface s, Detail d) {", *body, "}"]
@@ -184,6 +187,11 @@ def read_source(planes: Sequence[Plane], layout: Layout) -> str:
             "}",
         ]
     )
+
+
+def integer_attachments(planes: Sequence[Plane], layout: Layout) -> list[int]:
+    """Which of the targets hold unsigned integers."""
+    return [i for i, plane in enumerate(planes) if plane.encodings[layout].dtype == "u4"]
 
 
 def uses_standard_depth(layout: Layout) -> bool:

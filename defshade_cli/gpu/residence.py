@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -87,11 +87,12 @@ class GpuScene:
         self._pool: list[moderngl.Buffer] = []
         self._draws: list[moderngl.Buffer] = []
 
-    def update(self, scene: Scene, *, layer_uv: bool = False) -> DrawList:
+    def update(self, scene: Scene, inputs: Collection[str] = ()) -> DrawList:
         """Make the scene's geometry, placements and materials resident, relative to its camera.
 
-        layer_uv: texture coordinates for the layers too, whatever the materials read.
+        inputs: what layers read of the vertices, as gpu.planes.Plane.inputs names it.
         """
+        layer_uv = "LAYER_UV" in inputs
         self._instances.write(instance_records(scene.drawables, scene.camera.position))
         textures = self._update_materials(scene)
         color_varies = any(m.display_color is not None or m.display_opacity is not None for m in scene.meshes)
@@ -103,13 +104,15 @@ class GpuScene:
             self._pool = self._replaced(self._pool, arrays)
             self._meshes, self._made_for = scene.meshes, made_for
         commands, rows = draw_commands(scene.drawables, scene.meshes)
-        self._draws = self._replaced(self._draws, [commands, rows])
+        numbers = [np.arange(len(rows), dtype=np.uint32)] * ("DRAW_ROW" in inputs)
+        self._draws = self._replaced(self._draws, [commands, rows, *numbers])
         positions, normals, indices, *varying = self._pool
         vertices = [(positions, "3f", "position_object"), (normals, "3f", "normal_object")]
         names = [("4f", "vertex_color")] * color_varies + [("4f", "vertex_uv")] * textured
         names += [("2f", "vertex_layer_uv")] * layer_uv
         vertices += [(buffer, *name) for buffer, name in zip(varying, names, strict=True)]
         vertices.append((self._draws[1], "2u4/i", "draw"))
+        vertices += [(buffer, "1u4/i", "draw_row") for buffer in self._draws[2:]]
         corners = command_corners(scene)
         return DrawList(
             tuple(vertices), indices, self._draws[0], commands, corners, color_varies=color_varies, textures=textures

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from defshade_cli.errors import GpuError
 from defshade_cli.gpu.context import Gpu
 
-_READ_DTYPE = {"f1": np.uint8, "f2": np.float16, "f4": np.float32}
+_READ_DTYPE = {"f1": np.uint8, "f2": np.float16, "f4": np.float32, "u4": np.uint32}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

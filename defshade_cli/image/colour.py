@@ -14,7 +14,8 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from defshade_cli.errors import UsageError
-from defshade_cli.image.layers import SCENE_UNITS, UNIT_VECTOR, Layer
+from defshade_cli.image.false_colour import show_coordinates, show_ids, show_matte
+from defshade_cli.image.layers import ID, SCENE_UNITS, UNIT_VECTOR, Layer
 from defshade_cli.image.ocio import displays, open_config
 from defshade_cli.image.render_space import REC709, RenderSpace
 
@@ -93,7 +94,7 @@ def picture(layer: Layer, pixels: Pixels, transform: DisplayTransform, *, alpha:
 
     Colours go through the display transform: with straight alpha where `alpha` keeps it, else composited on black.
     Unit vectors become (v + 1) / 2, and lengths are stretched over what is finite, the least value white. What is
-    0..1 stays. Only EXR holds the data themselves.
+    0..1 stays, texture coordinates repeat, and ids get colours. Only EXR holds the data themselves.
     """
     if layer.is_color:
         return transform.apply(pixels if alpha else pixels[..., :3], straight=True)
@@ -101,7 +102,11 @@ def picture(layer: Layer, pixels: Pixels, transform: DisplayTransform, *, alpha:
         return np.clip(0.5 * pixels + 0.5, 0.0, 1.0)
     if layer.unit == SCENE_UNITS:
         return _stretched(pixels)
-    return np.clip(pixels, 0.0, 1.0)
+    if layer.unit == ID:
+        return show_ids(pixels, layer.background)
+    if layer.source == "matte":
+        return np.clip(show_matte(pixels), 0.0, 1.0)
+    return np.clip(show_coordinates(pixels) if pixels.shape[-1] == 2 else pixels, 0.0, 1.0)
 
 
 def _finite(pixels: Pixels) -> Pixels:

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.image.layers import LAYERS, Layer
 from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.scene.camera import Camera
 
@@ -45,6 +46,7 @@ class Film:
     samples: a pixel.
     origin: (x, y) of the first pixel in the display window, from its top left corner, y down.
     display: (width, height) of the display window that the camera fills; None where that is the layers' own size.
+    manifests: of layers that hold ids: name of the layer → what each id stands for.
     metadata: further facts for the file's header and `--stats`, JSON-like values.
     """
 
@@ -57,7 +59,12 @@ class Film:
     render_space: RenderSpace = REC709
     origin: tuple[int, int] = (0, 0)
     display: tuple[int, int] | None = None
+    manifests: dict[str, dict[int, str]] = field(default_factory=dict)
     metadata: dict[str, Any] = field(default_factory=dict)
+
+    def row(self, name: str) -> Layer:
+        """The layer's row of the table, with as many channels as it has here."""
+        return LAYERS[name].of_width(self.layers[name].shape[2])
 
     @property
     def size(self) -> tuple[int, int]:

@@ -4,7 +4,9 @@
     camera     worldToCamera, worldToNDC, screenWindowCenter, screenWindowWidth, pixelAspectRatio
     time       framesPerSecond, capDate, utcOffset
     people     owner (Film.metadata's), comments, Software
-    defshade/  scene, camera, frame, samples and all of Film.metadata; layers: what each one's numbers mean, as JSON
+    defshade/  scene, camera, frame, samples and all of Film.metadata; layers: what each one's numbers mean, as JSON;
+               LAYER/manifest: what ids stand for, as JSON
+    cryptomatte/  as its specification has them
 
 Definitions: OpenEXR, "Standard Attributes". Matrices there act on row vectors, and its camera space is left-handed with
 +z into the picture: USD's with z mirrored.
@@ -21,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from defshade_cli import __version__
+from defshade_cli.image.cryptomatte import cryptomatte_header
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import LAYERS, Layer
 from defshade_cli.scene.camera import Camera
@@ -48,6 +51,9 @@ def exr_attributes(film: Film, layers: tuple[str, ...]) -> Iterator[Attribute]:
     for name, value in provenance(film).items():
         yield _attribute(PREFIX + name, value)
     yield Attribute(f"{PREFIX}layers", "string", json.dumps({name: _meaning(LAYERS[name]) for name in layers}))
+    for name in layers:
+        if name in film.manifests:
+            yield from _manifest(LAYERS[name], film.manifests[name])
 
 
 def _meaning(layer: Layer) -> dict[str, str | bool]:
@@ -58,6 +64,14 @@ def _meaning(layer: Layer) -> dict[str, str | bool]:
         "background": f"{layer.background:g}",
         "antialiased": layer.filtered,
     }
+
+
+def _manifest(layer: Layer, names: dict[int, str]) -> Iterator[Attribute]:
+    if layer.source != "matte":
+        yield Attribute(f"{PREFIX}{layer.name}/manifest", "string", json.dumps(names))
+        return
+    for key, value in cryptomatte_header(layer.exr_name, names).items():
+        yield Attribute(key, "string", value)
 
 
 def text_attributes(film: Film) -> Iterator[Attribute]:

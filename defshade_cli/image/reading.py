@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.errors import OutputError
 from defshade_cli.image.colour import Pixels
-from defshade_cli.image.layers import BEAUTY, MAIN_PART
+from defshade_cli.image.layers import BEAUTY, MAIN_PART, layer_in_file
 from defshade_cli.image.metadata import read_provenance
 
 
@@ -75,6 +75,7 @@ def _grouped(spec: oiio.ImageSpec) -> dict[str, list[int]]:
     part = BEAUTY if part == MAIN_PART else part
     groups: dict[str, list[int]] = {}
     for index, channel in enumerate(spec.channelnames):
-        layer = channel.rpartition(".")[0] or part or ("depth" if channel == "Z" else BEAUTY)
+        prefix = channel.rpartition(".")[0]
+        layer = layer_in_file(prefix) if prefix else part or ("depth" if channel == "Z" else BEAUTY)
         groups.setdefault(layer, []).append(index)
     return groups

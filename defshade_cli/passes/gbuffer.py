@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import moderngl
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.planes import Plane, uses_standard_depth, write_source
+from defshade_cli.gpu.planes import Plane, integer_attachments, uses_standard_depth, write_source
 from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.residence import DrawList
 from defshade_cli.gpu.targets import Target, allocate
@@ -71,19 +71,25 @@ class GBufferPass:
             "generated/planes.glsl": write_source(variant.planes, variant.layout),
             "generated/textures.glsl": textures_source(variant.texture_groups),
         }
-        self._context = gpu.context
+        self._gpu, self._context = gpu, gpu.context
         self._program = gpu.shaders.program(
             "gbuffer.vert", "gbuffer.frag", defines=variant.defines, generated=generated
         )
 
-    def draw(self, draws: DrawList, gbuffer: GBuffer, mask: TileMask) -> None:
-        """All of `draws` with the bound View, one multi-draw; both sides of every face. Background under the mask."""
+    def draw(self, draws: DrawList, gbuffer: GBuffer, mask: TileMask, *, whole: bool = False) -> None:
+        """All of `draws` with the bound View, one multi-draw; both sides of every face.
+
+        Under the mask the depth is the background's afterwards, and the planes are undefined unless `whole`.
+        """
         standard = uses_standard_depth(gbuffer.layout)
         nearest, background = (0.0, 1.0) if standard else (1.0, 0.0)
         framebuffer = gbuffer.target.framebuffer
         framebuffer.use()
         framebuffer.clear(depth=background)
-        mask.fill(gbuffer.target, nearest)
+        for attachment in integer_attachments(gbuffer.planes, gbuffer.layout):
+            self._gpu.clear_integers(attachment)
+        if not whole:
+            mask.fill(gbuffer.target, nearest)
         framebuffer.use()
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = "<" if standard else ">"

@@ -17,6 +17,7 @@ from defshade_cli.passes.emitters import LitSample, light_batches
 from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
+from defshade_cli.passes.identification import Manifests, Mattes, id_manifests
 from defshade_cli.passes.lighting import LightingPass, LightingVariant, light_records
 from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
@@ -58,15 +59,18 @@ class Pipeline:
     def render(self, scene: Scene, plan: Plan) -> Film:
         """The plan's layers. Raises GpuError."""
         self._gpu.make_current()
-        draws = self._scene.update(scene, layer_uv=plan.reads("LAYER_UV"))
+        draws = self._scene.update(scene, plan.inputs)
         layers: Layers = {}
+        manifests: Manifests = {}
         sampling = Sampling(1, 1.0, 1)
         if plan.sampled:
-            layers, sampling = self._sampled_layers(draws, scene, plan)
+            layers, manifests, sampling = self._sampled_layers(draws, scene, plan)
         if plan.data_layers:
-            layers |= data_layers(self._data_planes(draws, plan), plan)
+            data = data_layers(self._data_planes(draws, plan), plan, scene)
+            layers, manifests = layers | data, manifests | id_manifests(data, scene)
         return Film(
             layers={name: layers[name] for name in plan.layers},
+            manifests=manifests,
             camera=plan.display_camera,
             origin=plan.window.origin,
             display=plan.display,
@@ -83,8 +87,9 @@ class Pipeline:
         self._gpu.make_current()
         return self._drawn_planes(self._scene.update(scene), plan.planes, plan)
 
-    def _sampled_layers(self, draws: DrawList, scene: Scene, plan: Plan) -> tuple[Layers, Sampling]:
-        """What is a mean over samples, or tells of them."""
+    def _sampled_layers(self, draws: DrawList, scene: Scene, plan: Plan) -> tuple[Layers, Manifests, Sampling]:
+        """What is a mean over samples or tells of them, and what ids in it stand for."""
+        mattes = Mattes(scene, plan)
         gbuffer = self._frame.gbuffer(plan.size, plan.planes, plan.layout)
         radiance = self._frame.radiance("sample", plan.size, gbuffer)
         tables = self._tables.update(plan)
@@ -92,14 +97,17 @@ class Pipeline:
         self._stopping.begin(plan)
         for sample in samples(plan.samples, plan.filter, plan.filter_width):
             self._draw_gbuffer(draws, plan, gbuffer, sample)
+            if plan.mattes:
+                mattes.add(gbuffer.target.read("visible"))
             self._light(draws, scene, plan, sample, tables, gbuffer, radiance)
             self._accumulation.add(radiance)
             if self._stopping.is_over(self._accumulation):
                 break
         sampling, counts, variance = self._stopping.finish(self._accumulation.count)
         beauty = self._accumulation.mean(counts)
-        of_samples = {"variance": variance, "sampleCount": counts.astype(np.float32)}
-        return {"beauty": beauty, "alpha": beauty[..., 3:], **of_samples}, sampling
+        layers = {"beauty": beauty, "alpha": beauty[..., 3:]} | mattes.layers(self._accumulation.count)
+        layers |= {"variance": variance, "sampleCount": counts.astype(np.float32)}
+        return layers, mattes.manifests(), sampling
 
     def _light(
         self,
@@ -153,4 +161,4 @@ class Pipeline:
         variant = GBufferVariant(
             gbuffer.planes, gbuffer.layout, plan.cutout, draws.color_varies, draws.texture_groups, plan.render_space
         )
-        self._gbuffer_pass(variant).draw(draws, gbuffer, self._mask)
+        self._gbuffer_pass(variant).draw(draws, gbuffer, self._mask, whole=bool(plan.mattes))

@@ -10,16 +10,19 @@ from numpy.typing import NDArray
 from defshade_cli.gpu.planes import Plane, uses_standard_depth
 from defshade_cli.image.layers import LAYERS, Layer
 from defshade_cli.passes.gbuffer import GBuffer
+from defshade_cli.passes.identification import id_values
 from defshade_cli.passes.view import camera_depth
 from defshade_cli.plan import Plan
 from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.identity import Identities
+from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import transform_directions, transform_points
 
-Planes = dict[str, NDArray[np.float32]]
+Planes = dict[str, NDArray]
 
 
 def read_planes(gbuffer: GBuffer, wanted: Iterable[Plane], plan: Plan) -> Planes:
-    """(height, width, components) float32 a plane of a float GBuffer, and "depth": planar, +inf on the background."""
+    """(height, width, components) a plane of a float GBuffer, and "depth": planar, +inf on the background."""
     planes: Planes = {plane.name: gbuffer.target.read(plane.name) for plane in wanted}
     stored = gbuffer.target.read_depth()
     depth = camera_depth(plan.camera, plan.clip, uses_standard_depth(gbuffer.layout), stored)
@@ -27,13 +30,16 @@ def read_planes(gbuffer: GBuffer, wanted: Iterable[Plane], plan: Plan) -> Planes
     return planes
 
 
-def data_layers(planes: Planes, plan: Plan) -> dict[str, NDArray[np.float32]]:
+def data_layers(planes: Planes, plan: Plan, scene: Scene) -> dict[str, NDArray[np.float32]]:
     """The data layers that the plan asks for, background filled in."""
-    covered = np.isfinite(planes["depth"])
+    covered, identities = np.isfinite(planes["depth"]), Identities(scene)
     layers = {}
     for name in plan.data_layers:
         layer = LAYERS[name]
-        values = _layer_values(layer, planes, plan.camera)
+        if layer.source == "visible":
+            values: NDArray = id_values(name, planes["visible"], identities)
+        else:
+            values = _layer_values(layer, planes, plan.camera)
         layers[name] = np.where(covered, values, np.float32(layer.background)).astype(np.float32)
     return layers
 

@@ -42,6 +42,7 @@ class Plan:
     cutout: some opacity may be below 1.  textures: some material reads them.
     data_pass: data layers need an unjittered float GBuffer of their own.
     levels: how often subdivision surfaces were refined, ascending; empty without any.
+    ranks: (id, coverage) pairs of a Cryptomatte.
     """
 
     display: tuple[int, int]
@@ -70,6 +71,7 @@ class Plan:
     data_pass: bool
     complexity: Complexity
     levels: tuple[int, ...]
+    ranks: int
 
     @property
     def size(self) -> tuple[int, int]:
@@ -97,9 +99,15 @@ class Plan:
         """Those read from planes at the pixels' centres."""
         return tuple(name for name in self.layers if not LAYERS[name].is_sampled)
 
-    def reads(self, define: str) -> bool:
-        """Must the GBuffer's shaders interpolate what `define` names?"""
-        return any(define in plane.inputs for plane in (*self.planes, *self.data_planes))
+    @property
+    def inputs(self) -> frozenset[str]:
+        """What the planes need of the vertices beside what lighting does."""
+        return frozenset(name for plane in (*self.planes, *self.data_planes) for name in plane.inputs)
+
+    @property
+    def mattes(self) -> tuple[str, ...]:
+        """The layers that are Cryptomattes."""
+        return tuple(name for name in self.layers if LAYERS[name].source == "matte")
 
     @property
     def domes(self) -> tuple[DomeLight, ...]:
@@ -168,6 +176,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         textures=bool(scene.textures),
         data_pass=data_pass,
         complexity=settings.complexity,
+        ranks=settings.cryptomatte_levels,
         levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None})),
     )
 
@@ -189,6 +198,7 @@ def _divide_planes(
     """
     rows = [LAYERS[name] for name in layers]
     lit = _lit_planes(scene) if any(row.source == "lighting" for row in rows) else ()
+    lit += named_planes("visible" for row in rows if row.source == "matte")
     data = named_planes(row.source for row in rows)
     both = named_planes(plane.name for plane in (*lit, *data))
     sampled, has_data = any(row.is_sampled for row in rows), not all(row.is_sampled for row in rows)

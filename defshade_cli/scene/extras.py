@@ -9,10 +9,11 @@ from dataclasses import dataclass
 class Extras:
     """Nothing of this changes the lit image.
 
-    occlusion: of materials.
+    occlusion: of materials.  assets: which component each prim is part of.
     """
 
     occlusion: bool = False
+    assets: bool = False
 
 
 NO_EXTRAS = Extras()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -31,6 +32,7 @@ class Scene:
 
     camera: the one to render; cameras: the paths of all that the stage has.
     frame: time code, None for the default time.
+    assets: path of a drawn prim → path of the component that it is part of; empty unless asked for.
     resolution, pixel_aspect, conform, data_window: of the stage's UsdRenderSettings, where it names one; the window
         is (xmin, ymin, xmax, ymax), 0..1 over the image, y up.
     rendering_space: the colour space that they name; None for linear Rec.709, in which a Scene's colours are.
@@ -50,6 +52,7 @@ class Scene:
     frames_per_second: float = 24.0
     resolution: tuple[int, int] | None = None
     pixel_aspect: float = 1.0
+    assets: Mapping[str, str] = field(default_factory=dict)
     conform: ConformPolicy = "expandAperture"
     data_window: tuple[float, float, float, float] = WHOLE_IMAGE
     rendering_space: str | None = None

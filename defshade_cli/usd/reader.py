@@ -21,6 +21,7 @@ from defshade_cli.usd import stage as facts
 from defshade_cli.usd.camera import choose_camera, find_cameras, framed_camera, read_camera
 from defshade_cli.usd.complexity import View, choose_levels
 from defshade_cli.usd.geometry import Gprim, Surface
+from defshade_cli.usd.identity import read_assets
 from defshade_cli.usd.instancing import Piece
 from defshade_cli.usd.light import camera_light
 from defshade_cli.usd.linking import link
@@ -58,6 +59,7 @@ class StageReader:
     ) -> None:
         self._stage, self._purposes = stage, tuple(purposes)
         self._complexity, self._size, self._width = complexity, size, width
+        self._extras = extras
         self._memory = Memory(stage, extras)
         self._tessellation = Tessellation()
         self._settings = read_settings(stage)
@@ -114,6 +116,7 @@ class StageReader:
             pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
             data_window=self._settings.data_window,
+            assets=read_assets(self._stage, _paths(drawables)) if self._extras.assets else {},
             rendering_space=self._settings.rendering_space,
         )
 
@@ -160,6 +163,11 @@ def _drawables(
             display_color=np.nan_to_num(piece.display_color, nan=UNBOUND.diffuse_color[0]),
             display_opacity=np.nan_to_num(piece.display_opacity, nan=UNBOUND.opacity),
         )
+
+
+def _paths(drawables: Iterable[Drawable]) -> dict[str, None]:
+    """Of every prim that is drawn, each once."""
+    return dict.fromkeys(path for drawable in drawables for path in drawable.paths)
 
 
 def _lights(pieces: Iterable[Piece]) -> Iterator[Light]:

@@ -6,6 +6,7 @@ struct Detail {
     vec3 tangent;              // unit, or 0
     vec2 uv;
     float occlusion;
+    uvec2 visible;             // 1 + row of the draw list, triangle of its command; (0, 0) is the background
 };
 
 // Normal of the triangle. Pixels run right and down, so what is seen always turns the same way.

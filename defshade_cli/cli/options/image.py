@@ -10,7 +10,7 @@ import click
 from defshade_cli import settings
 from defshade_cli.cli.options.option import Function, Option
 from defshade_cli.cli.options.sampling import sampling_options
-from defshade_cli.cli.types import Crop, Finite, Layers, Size
+from defshade_cli.cli.types import Crop, Finite, Layers, Ranks, Size
 from defshade_cli.settings import RenderSettings
 
 _RENDER = RenderSettings()
@@ -47,6 +47,14 @@ def image_options(layers: Sequence[str]) -> list[Function]:
             default_text=",".join(layers),
             help="Layers to write, with commas between, of those listed below or by their names in Hydra, "
             "Arnold and Blender; 'all' for all that are listed.",
+        ),
+        option(
+            "--cryptomatte-levels",
+            type=Ranks(),
+            default=_RENDER.cryptomatte_levels,
+            default_text=str(_RENDER.cryptomatte_levels),
+            metavar="N",
+            help="Ids that a pixel of a Cryptomatte holds, the greatest coverage first: an even number up to 16.",
         ),
         *sampling_options(),
         *_shading_options(),

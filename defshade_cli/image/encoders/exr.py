@@ -72,8 +72,8 @@ def _part(film: Film, names: tuple[str, ...], output: OutputSettings) -> _Part:
 
 
 def _spec(film: Film, names: tuple[str, ...], halves: set[str], compression: Compression) -> oiio.ImageSpec:
-    channels = [channel for name in names for channel in LAYERS[name].channel_names]
-    types = ["half" if name in halves else "float" for name in names for _ in LAYERS[name].channels]
+    channels = [channel for name in names for channel in film.row(name).channel_names]
+    types = ["half" if name in halves else "float" for name in names for _ in film.row(name).channels]
     spec = make_spec(film, len(channels), types[0])
     spec.channelnames = channels
     if len(set(types)) > 1:
@@ -85,7 +85,7 @@ def _spec(film: Film, names: tuple[str, ...], halves: set[str], compression: Com
 
 
 def _lossless_for_data(compression: Compression, names: tuple[str, ...]) -> Compression:
-    data = [name for name in names if not LAYERS[name].is_color and _DWA_LOSSY & set(LAYERS[name].channels)]
+    data = [name for name in names if not LAYERS[name].is_color and _DWA_LOSSY & LAYERS[name].suffixes]
     if compression != "dwaa" or not data:
         return compression
     log.warning("dwaa would blur the data in %s: this file is compressed with zip", ", ".join(data))

@@ -4,12 +4,13 @@ table   the rows        layer   what a row says
 names   what other renderers call them, and how a request becomes rows
 """
 
-from defshade_cli.image.layers.layer import BEAUTY, MAIN_PART, SCENE_LINEAR, SCENE_UNITS, UNIT_VECTOR, Layer
-from defshade_cli.image.layers.names import ALIASES, LAYERS, in_order, resolve
+from defshade_cli.image.layers.layer import BEAUTY, ID, MAIN_PART, SCENE_LINEAR, SCENE_UNITS, UNIT_VECTOR, Layer
+from defshade_cli.image.layers.names import ALIASES, LAYERS, in_order, layer_in_file, resolve
 
 __all__ = [
     "ALIASES",
     "BEAUTY",
+    "ID",
     "LAYERS",
     "MAIN_PART",
     "SCENE_LINEAR",
@@ -17,5 +18,6 @@ __all__ = [
     "UNIT_VECTOR",
     "Layer",
     "in_order",
+    "layer_in_file",
     "resolve",
 ]

@@ -5,14 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
-SampledSource = Literal["lighting", "coverage"]
+SampledSource = Literal["lighting", "coverage", "matte"]
 """Sources that are summed over samples; any other is a plane of the data GBuffer."""
 
 BEAUTY = "beauty"
 MAIN_PART = "rgba"
 """The part of a multi-part EXR that holds the beauty, as Nuke names it."""
 
-SCENE_LINEAR, SCENE_UNITS, UNIT_VECTOR = "scene-linear", "scene units", "unit vector"
+SCENE_LINEAR, SCENE_UNITS, UNIT_VECTOR, ID = "scene-linear", "scene units", "unit vector", "id"
+
+MOST_RANKS = 16
+"""Of a Cryptomatte."""
+
+MATTE_CHANNELS = tuple(f"{group:02d}.{channel}" for group in range(MOST_RANKS // 2) for channel in "RGBA")
+"""(id, coverage) of rank after rank, two ranks a group."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,9 +55,26 @@ class Layer:
 
     @property
     def channel_names(self) -> tuple[str, ...]:
-        """As in EXR: `R` for the beauty, which readers look for without a layer, `normal.X` for the others."""
-        return self.channels if self.name == BEAUTY else tuple(f"{self.name}.{c}" for c in self.channels)
+        """As in EXR: `R` for the beauty, which readers look for without a layer, `normal.X` for the others.
+
+        Mattes are `CryptoObject00.R`, as Cryptomatte's specification has them.
+        """
+        if self.name == BEAUTY:
+            return self.channels
+        separator = "" if self.source == "matte" else "."
+        return tuple(f"{self.exr_name}{separator}{channel}" for channel in self.channels)
+
+    @property
+    def suffixes(self) -> set[str]:
+        """The last part of its channels' names, by which readers and compressions know them."""
+        return {channel.rpartition(".")[2] for channel in self.channels}
+
+    @property
+    def exr_name(self) -> str:
+        """What stands before the channels."""
+        return self.name[0].upper() + self.name[1:] if self.source == "matte" else self.name
 
     def of_width(self, width: int) -> Layer:
-        """The same with its first `width` channels."""
-        return replace(self, channels=self.channels[:width])
+        """The same with `width` channels: its first ones, or of a matte as many as there are ranks."""
+        channels = MATTE_CHANNELS if self.source == "matte" else self.channels
+        return replace(self, channels=channels[:width])

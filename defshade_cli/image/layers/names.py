@@ -21,6 +21,10 @@ ALIASES: dict[str, str] = {
     "P": "position",
     "N": "normal",
     "Ng": "geometricNormal",
+    "ID": "primId",
+    "crypto_object": "cryptoObject",
+    "crypto_material": "cryptoMaterial",
+    "crypto_asset": "cryptoAsset",
     # Blender: names of passes
     "Combined": "beauty",
     "Alpha": "alpha",
@@ -30,6 +34,10 @@ ALIASES: dict[str, str] = {
     "UV": "uv",
     "DiffCol": "albedo",
     "Emit": "emission",
+    "IndexMA": "materialId",
+    "CryptoObject": "cryptoObject",
+    "CryptoMaterial": "cryptoMaterial",
+    "CryptoAsset": "cryptoAsset",
 }
 """Another renderer's name → ours."""
 
@@ -66,6 +74,12 @@ def _guess(unknown: list[str]) -> str:
     """The names that nobody has, with what the first may have meant."""
     close = difflib.get_close_matches(unknown[0], [*LAYERS, *ALIASES], 1) if unknown else []
     return (", ".join(unknown) or "(none given)") + (f" (did you mean '{close[0]}'?)" if close else "")
+
+
+def layer_in_file(prefix: str) -> str:
+    """The layer of which a file's channels named `prefix.…` are a part: those of mattes count through."""
+    known = {layer.exr_name: name for name, layer in LAYERS.items()}
+    return known.get(prefix) or known.get(prefix.rstrip("0123456789"), prefix)
 
 
 def in_order(names: Iterable[str]) -> tuple[str, ...]:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from math import inf
 
-from defshade_cli.image.layers.layer import BEAUTY, SCENE_LINEAR, SCENE_UNITS, UNIT_VECTOR, Layer
+from defshade_cli.image.layers.layer import BEAUTY, ID, MATTE_CHANNELS, SCENE_LINEAR, SCENE_UNITS, UNIT_VECTOR, Layer
+from defshade_cli.settings import RenderSettings
 
 _RGBA, _XYZ = ("R", "G", "B", "A"), ("X", "Y", "Z")
+
+DEFAULT_RANKS = RenderSettings().cryptomatte_levels
 
 
 def _color(name: str, source: str, summary: str) -> Layer:
@@ -33,6 +36,15 @@ def _statistic(name: str, unit: str, summary: str) -> Layer:
     return Layer(name, ("Y",), unit, "none", "lighting", 0.0, True, summary)
 
 
+def _id(name: str, source: str, summary: str) -> Layer:
+    return Layer(name, ("ID",), ID, "none", source, -1.0, False, summary)
+
+
+def _matte(name: str, summary: str) -> Layer:
+    """Ranks in pairs, two to a group of four channels; as many as --cryptomatte-levels says."""
+    return Layer(name, MATTE_CHANNELS[: 2 * DEFAULT_RANKS], "id and coverage", "none", "matte", 0.0, True, summary)
+
+
 ROWS: dict[str, Layer] = {
     layer.name: layer
     for layer in (
@@ -57,5 +69,12 @@ ROWS: dict[str, Layer] = {
         _scalar("clearcoat", "clearcoat", "amount of clearcoat"),
         _scalar("clearcoatRoughness", "clearcoat", "perceptual roughness of the clearcoat", first=1),
         _scalar("occlusion", "occlusion", "the material's occlusion; direct light does not see it", background=1.0),
+        _id("primId", "visible", "the prim: the manifest has its path"),
+        _id("instanceId", "visible", "which instance of the prim; −1 for what is none"),
+        _id("elementId", "visible", "the face of the mesh as authored"),
+        _id("materialId", "visible", "the material: the manifest has its path"),
+        _matte("cryptoObject", "Cryptomatte of prims"),
+        _matte("cryptoMaterial", "Cryptomatte of materials"),
+        _matte("cryptoAsset", "Cryptomatte of components, as model kinds have them"),
     )
 }
