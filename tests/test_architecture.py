@@ -33,6 +33,7 @@ STRANGERS = {
 
 FOREIGN = {
     "pxr": ("usd",),
+    "MaterialX": ("usd",),
     "moderngl": ("gpu", "passes"),
     "glcontext": ("gpu",),
     "OpenImageIO": ("image",),

@@ -245,8 +245,8 @@ def test_occlusion_is_nothing_to_report() -> None:
             "no UsdPreviewSurface, only mtlx:surface",
         ),
         (
-            surface("m").replace("UsdPreviewSurface", "ND_standard_surface_surfaceshader"),
-            "surface ND_standard_surface_surfaceshader is not UsdPreviewSurface",
+            surface("m").replace("UsdPreviewSurface", "ND_disney_principled"),
+            "surface ND_disney_principled is not UsdPreviewSurface",
         ),
         (
             surface("m").replace('info:id = "UsdPreviewSurface"', 'info:implementationSource = "sourceAsset"'),

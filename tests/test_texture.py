@@ -168,7 +168,7 @@ def test_a_texel_a_pixel_is_the_image(pipeline: Pipeline, tmp_path: Path, color_
 def test_channel_scale_and_bias(pipeline: Pipeline, tmp_path: Path) -> None:
     pixels = noise(3)
     texture = plain(save(tmp_path / "a.png", pixels), color_space="raw")
-    roughness = TextureInput(texture, "g", scale=(1, 0.5, 1, 1), bias=(0, 0.25, 0, 0))
+    roughness = TextureInput(texture, "g", scale=(0.5,) * 4, bias=(0.25,) * 4)
     found = layer(pipeline, textured({"roughness": roughness}), "roughness")
     np.testing.assert_allclose(found[..., 0], pixels[..., 1] / 255 * 0.5 + 0.25, atol=2e-3)
 

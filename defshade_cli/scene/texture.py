@@ -40,8 +40,9 @@ class Texture:
 
 @dataclass(frozen=True, slots=True)
 class TextureInput:
-    """What feeds one input of a material: channel of (texel · scale + bias) at texture_from_uv · (u, v, 1).
+    """What feeds one input of a material: texel's channel · scale + bias, at texture_from_uv · (u, v, 1).
 
+    channel: one letter fills all channels, to each of which scale and bias then apply.
     uv: primvar that holds the texture coordinates; empty for none, the affine's offset alone then counts.
     A UDIM tile that is missing is black with alpha 0; where no file can be read, the material's own value stands.
     """

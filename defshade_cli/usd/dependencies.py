@@ -9,6 +9,8 @@ from pathlib import Path
 from pxr import Ar, Sdf, Tf, UsdUtils
 
 from defshade_cli.errors import StageError
+from defshade_cli.usd.materialx.document import source_of
+from defshade_cli.usd.materialx.documents import files_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +22,7 @@ class Dependencies:
 
 
 def read_dependencies(stage: Path) -> Dependencies:
-    """Layers, textures and other assets of a stage, through every reference, payload, clip and variant.
+    """Layers, textures and other assets of a stage, through every reference, payload, clip, variant and document.
 
     A package (.usdz) is one file, whatever is used of it. Raises StageError where one of the layers cannot be read.
     """
@@ -31,11 +33,15 @@ def read_dependencies(stage: Path) -> Dependencies:
         raise StageError(f"{stage} depends on a layer that cannot be read") from error
     finally:
         del delegate
-    paths = {_outermost(path) for path in (*(layer.realPath for layer in layers), *assets) if path}
+    documents = {name: source_of(name) for name in missing}
+    named = [*(layer.realPath for layer in layers), *assets, *documents.values()]
+    paths = {_outermost(path) for path in (*named, *files_of(named)) if path}
     folder = stage.resolve().parent
     files = {os.path.relpath(path, folder): Path(path) for path in paths if Path(path).is_file()}
     elsewhere = (path for path in paths if not Path(path).is_file())
-    return Dependencies(files, tuple(sorted({*missing, *elsewhere})))
+    return Dependencies(
+        files, tuple(sorted({*(name for name, document in documents.items() if not document), *elsewhere}))
+    )
 
 
 def _outermost(path: str) -> str:

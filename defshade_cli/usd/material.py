@@ -3,7 +3,8 @@
 Read are UsdPreviewSurface nodes whose inputs are constant or come from a UsdUVTexture, also through the interfaces of
 materials and node graphs, and readers of displayColor. Any other source of an input is named in the report, and so is
 a texture without its file: the input then takes the fallback that is authored on the node in its place, or the
-schema's default.
+schema's default. MaterialX shaders are translated by usd/materialx; a material that has both is a UsdPreviewSurface,
+of which nothing is lost.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from pxr import Sdf, Usd, UsdShade
 from defshade_cli.scene.material import TEXTURED_FIELDS, UNBOUND, UV_SETS, Material
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.scene.texture import TextureInput
+from defshade_cli.usd.materialx.models import MODELS, translate
 from defshade_cli.usd.network import Network, computed, node_of
 from defshade_cli.usd.texture import Unreadable, read_texture_input
 
@@ -44,11 +46,13 @@ _WITHOUT_EFFECT = ("occlusion",)
 _DEFAULTS = {f.name: f.default for f in fields(Material)}
 _CHANNELS = {"r": slice(0, 1), "g": slice(1, 2), "b": slice(2, 3), "a": slice(3, 4)}
 _READER = "UsdPrimvarReader_"
+_PREVIEW_SURFACE = "UsdPreviewSurface"
+_MATERIALX = "mtlx"
 
 
 @dataclass(frozen=True, slots=True)
 class ReadMaterial:
-    """understood: its surface is a UsdPreviewSurface. time_varying: some value that was read differs over time."""
+    """understood: its surface is of a model that we know.  time_varying: some value that was read differs over time."""
 
     material: Material
     understood: bool = True
@@ -76,19 +80,31 @@ def read_material(
     prim = UsdShade.Material(stage.GetPrimAtPath(path))
     if not prim:
         return _not_understood(shown_as, "the bound material does not exist")
-    shader, _, _ = prim.ComputeSurfaceSource()
-    identifier = shader.GetShaderId() if shader else None
-    if identifier != "UsdPreviewSurface":
+    network = Network(time)
+    shader, identifier = _surface_of(prim)
+    if identifier == _PREVIEW_SURFACE:
+        inputs = _read_inputs(shader, network, () if occlusion else _WITHOUT_EFFECT)
+        material = Material(shown_as, **inputs.values, inputs=inputs.textures)
+        reason, left_out = "not read", inputs.left_out
+    elif identifier in MODELS:
+        translation = translate(shader, identifier, network, occlusion=occlusion)
+        material = Material(shown_as, **translation.values, inputs=translation.textures)
+        reason, left_out = f"lost of {identifier}", list(translation.lost)
+    else:
         return _not_understood(shown_as, _surface_named(prim, shader, identifier))
-    inputs = _read_inputs(shader, Network(time), () if occlusion else _WITHOUT_EFFECT)
-    material = Material(shown_as, **inputs.values, inputs=inputs.textures)
-    inputs.left_out.extend(f"textures at primvar {name}" for name in material.uv_names[UV_SETS:])
-    reason = f"not read: {', '.join(inputs.left_out)}"
-    return ReadMaterial(
-        material,
-        time_varying=inputs.network.time_varying,
-        issues=(Unsupported(shown_as, reason),) if inputs.left_out else (),
-    )
+    left_out.extend(f"textures at primvar {name}" for name in material.uv_names[UV_SETS:])
+    issues = (Unsupported(shown_as, f"{reason}: {', '.join(left_out)}"),) if left_out else ()
+    return ReadMaterial(material, time_varying=network.time_varying, issues=issues)
+
+
+def _surface_of(material: UsdShade.Material) -> tuple[UsdShade.Shader, str]:
+    """The surface's shader and what it is: the universal one, else MaterialX's."""
+    sources = [material.ComputeSurfaceSource(c)[0] for c in (UsdShade.Tokens.universalRenderContext, _MATERIALX)]
+    for shader in filter(None, sources):
+        identifier = str(shader.GetShaderId() or "")
+        if identifier == _PREVIEW_SURFACE or identifier in MODELS:
+            return shader, identifier
+    return sources[0], str(sources[0].GetShaderId() or "") if sources[0] else ""
 
 
 def _not_understood(path: str, reason: str) -> ReadMaterial:
@@ -96,7 +112,7 @@ def _not_understood(path: str, reason: str) -> ReadMaterial:
     return ReadMaterial(material, understood=False, issues=(Unsupported(path, reason),))
 
 
-def _surface_named(material: UsdShade.Material, shader: UsdShade.Shader, identifier: str | None) -> str:
+def _surface_named(material: UsdShade.Material, shader: UsdShade.Shader, identifier: str) -> str:
     if shader:
         return f"surface {identifier or 'shader of source code'} is not UsdPreviewSurface"
     contexts = [output.GetBaseName() for output in material.GetSurfaceOutputs() if output.HasConnectedSource()]

@@ -14,6 +14,7 @@ from pxr import Usd, UsdGeom, UsdUtils
 
 from defshade_cli.settings import Composition
 from defshade_cli.usd.composition import compose
+from defshade_cli.usd.materialx.documents import is_about_documents, supply_documents
 from defshade_cli.usd.unresolved import find_unresolved, summary
 
 log = logging.getLogger("defshade")
@@ -32,6 +33,9 @@ def open_stage(path: Path, composition: Composition = _AS_AUTHORED, camera: str 
         stage = compose(path, composition, camera)
         unresolved = find_unresolved(stage)
         told.update(arc.text for arc in unresolved)
+        if any(is_about_documents(arc.text) for arc in unresolved):
+            supply_documents(stage)
+            unresolved = tuple(arc for arc in find_unresolved(stage) if not is_about_documents(arc.text))
     if unresolved:
         log.warning("%s", summary(unresolved))
     return stage

@@ -14,6 +14,7 @@ from defshade_cli.scene.texture import (
     Affine,
     Channel,
     ColorSpace,
+    Four,
     ImageFile,
     Texture,
     TextureInput,
@@ -43,14 +44,21 @@ def read_texture_input(network: Network, output: Usd.Attribute) -> TextureInput:
         wrap_s=_one_of(network.value(node, "wrapS"), get_args(Wrap), "useMetadata"),
         wrap_t=_one_of(network.value(node, "wrapT"), get_args(Wrap), "useMetadata"),
     )
+    channel = cast(Channel, _one_of(output.GetName().rpartition(":")[2], get_args(Channel), "rgb"))
     return TextureInput(
         texture,
-        cast(Channel, _one_of(output.GetName().rpartition(":")[2], get_args(Channel), "rgb")),
-        scale=_floats(network.value(node, "scale", (1, 1, 1, 1)), 4),
-        bias=_floats(network.value(node, "bias", (0, 0, 0, 0)), 4),
+        channel,
+        scale=_of_channel(channel, network.value(node, "scale", (1, 1, 1, 1))),
+        bias=_of_channel(channel, network.value(node, "bias", (0, 0, 0, 0))),
         uv=uv,
         texture_from_uv=texture_from_uv,
     )
+
+
+def _of_channel(channel: Channel, value: Any) -> Four:
+    """What the schema gives by texel channel, for the channels that come out."""
+    four = _floats(value, 4)
+    return four if channel == "rgb" else (four["rgba".index(channel)],) * 4
 
 
 def _coordinates(network: Network, source: Usd.Attribute | None) -> tuple[str, Affine]:

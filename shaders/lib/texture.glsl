@@ -54,8 +54,8 @@ Tile find_tile(TextureInput t, inout Coordinates c) {
 // UsdUVTexture's output at some coordinates.
 vec4 read_texture(TextureInput t, Coordinates c) {
     Tile tile = find_tile(t, c);
-    vec4 value = read_tile(tile, t, c) * t.scale + t.bias;
-    return t.channel == ALL_CHANNELS ? value : vec4(value[t.channel]);
+    vec4 texel = read_tile(tile, t, c);
+    return (t.channel == ALL_CHANNELS ? texel : vec4(texel[t.channel])) * t.scale + t.bias;
 }
 
 // The frame that normal maps are baked in: MikkTSpace's.
