@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import MOST_TARGETS, Plane
 from defshade_cli.gpu.residence import LIGHTS, VIEW, DrawList, GpuScene, RecordBuffer
-from defshade_cli.gpu.targets import Target
 from defshade_cli.image.film import Film, Sampling
 from defshade_cli.passes.accumulation import AccumulationPass
 from defshade_cli.passes.emitters import LitSample, light_batches
@@ -18,6 +17,7 @@ from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
 from defshade_cli.passes.identification import Manifests, Mattes, id_manifests
+from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.lighting import LightingPass, LightingVariant, light_records
 from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
@@ -92,6 +92,8 @@ class Pipeline:
         mattes = Mattes(scene, plan)
         gbuffer = self._frame.gbuffer(plan.size, plan.planes, plan.layout)
         radiance = self._frame.radiance("sample", plan.size, gbuffer)
+        targets = self._frame.light_targets(radiance, plan)
+        targets.clear()
         tables = self._tables.update(plan)
         self._accumulation.begin(plan.size, plan.samples)
         self._stopping.begin(plan)
@@ -99,15 +101,15 @@ class Pipeline:
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             if plan.mattes:
                 mattes.add(gbuffer.target.read("visible"))
-            self._light(draws, scene, plan, sample, tables, gbuffer, radiance)
+            self._light(draws, scene, plan, sample, tables, gbuffer, targets)
             self._accumulation.add(radiance)
             if self._stopping.is_over(self._accumulation):
                 break
         sampling, counts, variance = self._stopping.finish(self._accumulation.count)
         beauty = self._accumulation.mean(counts)
-        layers = {"beauty": beauty, "alpha": beauty[..., 3:]} | mattes.layers(self._accumulation.count)
+        layers = {"beauty": beauty, "alpha": beauty[..., 3:]} | targets.layers(counts)
         layers |= {"variance": variance, "sampleCount": counts.astype(np.float32)}
-        return layers, mattes.manifests(), sampling
+        return layers | mattes.layers(self._accumulation.count), mattes.manifests(), sampling
 
     def _light(
         self,
@@ -117,19 +119,19 @@ class Pipeline:
         sample: Sample,
         tables: LightTables,
         gbuffer: GBuffer,
-        radiance: Target,
+        targets: LightTargets,
     ) -> None:
         """One sample of every light: as many at a time as the shadow atlas holds."""
         lighting = self._lighting_pass(LightingVariant.of(plan))
-        lighting.begin(gbuffer, radiance)
+        lighting.begin(gbuffer, targets)
         for dome in plan.domes:
             environment = self._environment_pass(EnvironmentVariant.of(plan))
-            environment.draw(dome, gbuffer, radiance, tables.links.lights.get(dome, ALL_LINKED))
+            environment.draw(dome, gbuffer, targets, tables.links.lights.get(dome.light, ALL_LINKED))
         for batch in light_batches(scene, plan, sample) if plan.lit else ():
             shadows = self._shadow_maps(draws, batch, plan, sample, tables) if plan.shadows else None
             lights, emitters = [lit.planned for lit in batch], [lit.emitter for lit in batch]
             self._lights.write(light_records(lights, emitters, plan.camera.position, shadows, tables))
-            lighting.add(lights, gbuffer, radiance, shadows, tables)
+            lighting.add(lights, gbuffer, targets, shadows, tables)
 
     def _shadow_maps(
         self, draws: DrawList, batch: list[LitSample], plan: Plan, sample: Sample, tables: LightTables
