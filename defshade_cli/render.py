@@ -165,8 +165,8 @@ def _render_image(shot: Shot, opened: OpenJob, renderer: Renderer, command: str)
     with _timed(seconds, "draw"):
         film = pipeline.render(scene, plan)
     with _timed(seconds, "write"):
-        provenance = _provenance(shot, command) | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of}
-        film = replace(film, metadata=provenance)
+        facts = _provenance(shot, command) | film.metadata | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of}
+        film = replace(film, metadata=facts)
         written = tuple(file for path in shot_paths(shot) for file in write(film, job.output, path))
     return ImageResult(written, film=film, plan=plan, seconds=seconds)
 
@@ -179,7 +179,6 @@ def _provenance(shot: Shot, command: str) -> dict[str, Any]:
 
 def _cost(plan: Plan, seconds: float) -> dict[str, Any]:
     return {
-        "samples": plan.samples,
         "layout": plan.layout,
         "shading": plan.shading,
         "seconds": round(seconds, 4),
