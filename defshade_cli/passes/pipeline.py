@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import MOST_TARGETS, Plane
-from defshade_cli.gpu.residence import LIGHTS, VIEW, DrawList, GpuScene, RecordBuffer
+from defshade_cli.gpu.residence import LIGHTS, MOTIONS, VIEW, DrawList, GpuScene, RecordBuffer
 from defshade_cli.image.film import Film, Sampling
 from defshade_cli.passes.accumulation import AccumulationPass
 from defshade_cli.passes.emitters import LitSample, light_batches
@@ -20,6 +20,7 @@ from defshade_cli.passes.identification import Manifests, Mattes, id_manifests
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.lighting import LightingPass, LightingVariant, light_records
 from defshade_cli.passes.linking import ALL_LINKED
+from defshade_cli.passes.motion import motion_records, neighbouring_points
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
 from defshade_cli.passes.screen import Screen, TileMask
@@ -43,6 +44,7 @@ class Pipeline:
         self._frame = Frame(gpu)
         self._view = RecordBuffer(gpu, VIEW)
         self._lights = RecordBuffer(gpu, LIGHTS)
+        self._motions = RecordBuffer(gpu, MOTIONS)
         self._screen, self._mask = Screen(gpu), TileMask(gpu)
         self._gbuffer_pass = cache(lambda variant: GBufferPass(gpu, variant))
         self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant, self._screen))
@@ -59,7 +61,7 @@ class Pipeline:
     def render(self, scene: Scene, plan: Plan) -> Film:
         """The plan's layers. Raises GpuError."""
         self._gpu.make_current()
-        draws = self._scene.update(scene, plan.inputs)
+        draws = self._resident(scene, plan)
         layers: Layers = {}
         manifests: Manifests = {}
         sampling = Sampling(1, 1.0, 1)
@@ -81,6 +83,13 @@ class Pipeline:
             samples=sampling.most,
             metadata=sampling.facts if plan.sampled else {},
         )
+
+    def _resident(self, scene: Scene, plan: Plan) -> DrawList:
+        """The scene on the GPU, with what the plan's planes read of it."""
+        if "MOTION" not in plan.inputs:
+            return self._scene.update(scene, plan.inputs)
+        self._motions.write(motion_records(scene, plan))
+        return self._scene.update(scene, plan.inputs, tuple(neighbouring_points(scene)))
 
     def planes(self, scene: Scene, plan: Plan) -> Planes:
         """The float GBuffer at the pixels' centres: what the float64 reference is evaluated on."""
