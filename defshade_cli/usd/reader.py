@@ -14,6 +14,7 @@ from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
 from defshade_cli.scene.light import Light
+from defshade_cli.scene.motion import Moment, moment_of
 from defshade_cli.scene.scene import Scene, Unsupported
 from defshade_cli.settings import Complexity
 from defshade_cli.usd import stage as facts
@@ -41,10 +42,13 @@ Glowing = tuple[Glow, tuple[Light, ...]]
 class StageReader:
     """Reads frames of one stage. What does not change over time is read once, and stays the same object.
 
-    camera: path or name; without it the rule of usd/camera.py picks.  purposes: of the geometry that is drawn.
+    camera: path or name; without it the rule of usd/camera.py picks.
+    purposes: of the geometry that is drawn; without them those of the render settings.
+    render_settings, product: paths of their prims; settings are found as usd/products.py does.
     complexity: of subdivision surfaces; for `auto` it matters how large the image is, see scene.camera.image_size.
     extras: what only some layers need.
-    Raises PrimNotFound for a camera that the stage lacks.
+    beside: a reader of the same stage, whose memory is shared.
+    Raises PrimNotFound for a camera or render settings that the stage lacks.
     """
 
     def __init__(
@@ -52,18 +56,21 @@ class StageReader:
         stage: Usd.Stage,
         *,
         camera: str | None = None,
-        purposes: Sequence[str] = ("default", "render"),
+        purposes: Sequence[str] | None = None,
+        render_settings: str | None = None,
+        product: str = "",
         complexity: Complexity = "auto",
         size: tuple[int, int] | None = None,
         width: int | None = None,
         extras: Extras = NO_EXTRAS,
+        beside: StageReader | None = None,
     ) -> None:
-        self._stage, self._purposes = stage, tuple(purposes)
         self._complexity, self._size, self._width = complexity, size, width
         self._extras = extras
-        self._memory = Memory(stage, extras)
-        self._tessellation = Tessellation()
-        self._settings = read_settings(stage)
+        self._memory: Memory = beside._memory if beside else Memory(stage, extras)
+        self._tessellation: Tessellation = beside._tessellation if beside else Tessellation()
+        self._settings = read_settings(stage, render_settings, product)
+        self._stage, self._purposes = stage, tuple(purposes or self._settings.purposes)
         self._cameras = find_cameras(stage)
         self._issues = tuple(arc.unsupported for arc in find_unresolved(stage))
         self._camera = choose_camera(stage, self._cameras, camera, self._settings.camera)
@@ -85,17 +92,27 @@ class StageReader:
         """
         time = Usd.TimeCode.Default() if frame is None else Usd.TimeCode(frame)
         with facts.gathered_diagnostics():
-            scene = self._read(frame, time)
+            levels: dict[str, int] = {}
+            scene = self._read(frame, time, levels)
+            if self._extras.motion and frame is not None:
+                neighbours = tuple(self._moment(scene, frame + step, levels) for step in (-1.0, 1.0))
+                scene = replace(scene, neighbours=neighbours)
         return _lit(scene)
 
-    def _read(self, frame: float | None, time: Usd.TimeCode) -> Scene:
+    def _moment(self, scene: Scene, frame: float, levels: dict[str, int]) -> Moment:
+        """What `scene` has, as it is at another frame, refined alike."""
+        then = self._read(frame, Usd.TimeCode(frame), levels)
+        return moment_of(scene.drawables, scene.meshes, then.camera, then.drawables, then.meshes)
+
+    def _read(self, frame: float | None, time: Usd.TimeCode, levels: dict[str, int]) -> Scene:
+        """levels: of refinement by path of the surface; those that are missing are chosen, and put in."""
         traversal = Traversal(self._stage, self._memory, time, self._purposes)
         pieces = traversal.read_stage()
         drawn = tuple(_drawn(pieces, self._purposes))
         if not drawn and not traversal.dormant:
             raise EmptyStage(_empty(self._stage, traversal.issues))
         camera, camera_issues = self._read_camera(time, drawn)
-        gprims = self._tessellate(drawn, camera)
+        gprims = self._tessellate(drawn, camera, levels)
         palette = Palette(self._memory, time)
         meshes: dict[Mesh, int] = {}
         glowing = _glowing(drawn, gprims, traversal.glows, palette)
@@ -134,13 +151,18 @@ class StageReader:
         camera, issues = read_camera(self._camera, time)
         return self._settings.applied_to(camera), issues
 
-    def _tessellate(self, drawn: Iterable[PlacedSurface], camera: Camera) -> dict[Surface, Gprim]:
+    def _tessellate(
+        self, drawn: Iterable[PlacedSurface], camera: Camera, levels: dict[str, int]
+    ) -> dict[Surface, Gprim]:
         width, height = image_size(camera.aspect, self._size, self._width, self._settings.resolution)
         aspect = width * self._settings.pixel_aspect_for(camera) / height
         view = View(camera.conformed(aspect, self._settings.conform), height)
         placed = ((surface, piece.root_from_object) for piece, surface in drawn)
-        levels = choose_levels(placed, self._complexity, view)
-        return {surface: self._tessellation.at_level(surface, level) for surface, level in levels.items()}
+        chosen = choose_levels(placed, self._complexity, view)
+        return {
+            surface: self._tessellation.at_level(surface, levels.setdefault(surface.path, level))
+            for surface, level in chosen.items()
+        }
 
 
 def _drawn(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[PlacedSurface]:
