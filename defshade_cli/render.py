@@ -165,7 +165,8 @@ def _render_frame(
     with _timed(seconds, "context"):
         pipeline = renderer.pipeline(job.device)
     with _timed(seconds, "draw"):
-        film = pipeline.render(scene, plan)
+        moments = ((seen, make_plan(seen, job.settings)) for seen in reader.read_shutter(scene, plan.moments))
+        film = pipeline.render(scene, plan, moments)
     with _timed(seconds, "write"):
         film = replace(film, metadata=provenance | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of})
         paths = frame_paths(job, frame, reader.camera_name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
@@ -28,6 +29,9 @@ from defshade_cli.passes.view import view_record
 from defshade_cli.plan import Plan
 from defshade_cli.scene.scene import Scene
 
+Moment = tuple[Scene, Plan]
+"""What is there while the shutter is open, at one time."""
+
 
 class Pipeline:
     """Renders one frame after another on a Gpu, keeping what they share: buffers, targets, compiled passes."""
@@ -50,15 +54,19 @@ class Pipeline:
         self._tables = TableStore(gpu)
         self._accumulation = AccumulationPass(gpu)
 
-    def render(self, scene: Scene, plan: Plan) -> Film:
-        """The plan's layers. Raises GpuError."""
+    def render(self, scene: Scene, plan: Plan, moments: Iterator[Moment] | None = None) -> Film:
+        """The plan's layers. Raises GpuError.
+
+        moments: what samples see in turn, where the plan has motion blur; data layers show the scene itself.
+        """
         self._gpu.make_current()
         draws = self._scene.update(scene, plan.inputs)
         layers: dict[str, NDArray[np.float32]] = {}
         manifests: Manifests = {}
         if plan.sampled:
-            layers, manifests = self._sampled_layers(draws, scene, plan)
+            layers, manifests = self._sampled_layers(draws, scene, plan, moments)
         if plan.data_layers:
+            draws = self._scene.update(scene, plan.inputs) if plan.moments else draws
             data = data_layers(self._data_planes(draws, plan), plan, scene)
             layers, manifests = layers | data, manifests | id_manifests(data, scene)
         return Film(
@@ -80,7 +88,7 @@ class Pipeline:
         return self._drawn_planes(self._scene.update(scene), plan.planes, plan)
 
     def _sampled_layers(
-        self, draws: DrawList, scene: Scene, plan: Plan
+        self, draws: DrawList, scene: Scene, plan: Plan, moments: Iterator[Moment] | None
     ) -> tuple[dict[str, NDArray[np.float32]], Manifests]:
         """What is a mean of samples, and what ids in it stand for."""
         mattes = Mattes(scene, plan)
@@ -90,6 +98,9 @@ class Pipeline:
         total.framebuffer.clear()
         tables = self._tables.update(plan)
         for sample in samples(plan.samples, plan.filter, plan.filter_width):
+            if moments and plan.moments and sample.index % plan.samples_a_moment == 0:
+                scene, plan = next(moments)
+                draws, tables = self._scene.update(scene, plan.inputs), self._tables.update(plan)
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             if plan.mattes:
                 mattes.add(gbuffer.target.read("visible"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -22,6 +23,12 @@ from defshade_cli.settings import FILTERS, Complexity, Filter, Layout, RenderSet
 from defshade_cli.spaces import transform_points
 from defshade_cli.units import exposure_scale
 
+MOST_MOMENTS = 32
+"""Times of the shutter at which a frame is read."""
+
+_SAMPLES_A_CYCLE = 256
+"""Samples after which the moments come round again, for a render that may stop early has to have seen all."""
+
 _MARGIN = 1e-3  # relative slack around bounds that float32 may round outwards
 
 
@@ -34,6 +41,7 @@ class Plan:
     clip: (near, far), the camera's range tightened to the geometry.
     render_space: of light and reflectance.
     exposure: linear, the camera's and the settings' together.
+    moments: of the shutter that the samples see, in turn; 0 without motion blur.
     filter_width: pixels.
     planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
     lights: sorted quads, spheres, cones.
@@ -55,6 +63,7 @@ class Plan:
     layout: Layout
     shading: Shading
     samples: int
+    moments: int
     filter: Filter
     filter_width: float
     layers: tuple[str, ...]
@@ -80,6 +89,11 @@ class Plan:
     def lit(self) -> bool:
         """Does any layer need the lighting?"""
         return any(LAYERS[name].source == "lighting" for name in self.layers)
+
+    @property
+    def samples_a_moment(self) -> int:
+        """How many samples in a row see the same moment."""
+        return math.ceil(min(self.samples, _SAMPLES_A_CYCLE) / self.moments)
 
     @property
     def sampled(self) -> bool:
@@ -153,6 +167,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         layout=settings.layout,
         shading=settings.shading,
         samples=settings.samples,
+        moments=_moments(scene, settings.samples) if settings.motion_blur else 0,
         filter=settings.filter,
         filter_width=settings.filter_width or FILTERS[settings.filter],
         layers=layers,
@@ -169,6 +184,13 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         ranks=settings.cryptomatte_levels,
         levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None})),
     )
+
+
+def _moments(scene: Scene, samples: int) -> int:
+    """Every sample sees its own moment, up to MOST_MOMENTS; one sample sees the frame."""
+    if samples == 1 or not scene.moves:
+        return 0
+    return math.ceil(samples / math.ceil(samples / MOST_MOMENTS)) if samples <= _SAMPLES_A_CYCLE else MOST_MOMENTS
 
 
 def _seen_lights(lights: tuple[PlannedLight, ...], layers: tuple[str, ...]) -> tuple[PlannedLight, ...]:

@@ -31,7 +31,7 @@ class Scene:
     """A stage at one time code, in world space and scene units.
 
     camera: the one to render; cameras: the paths of all that the stage has.
-    frame: time code, None for the default time.
+    frame: time code, None for the default time.  moves: something may differ while the shutter is open.
     assets: path of a drawn prim → path of the component that it is part of; empty unless asked for.
     resolution, pixel_aspect, conform, data_window: of the stage's UsdRenderSettings, where it names one; the window
         is (xmin, ymin, xmax, ymax), 0..1 over the image, y up.
@@ -49,6 +49,7 @@ class Scene:
     meters_per_unit: float = 0.01
     up_axis: str = "Y"
     frame: float | None = None
+    moves: bool = False
     frames_per_second: float = 24.0
     resolution: tuple[int, int] | None = None
     pixel_aspect: float = 1.0

@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
+from itertools import cycle
 
 import numpy as np
 from pxr import Usd
@@ -28,6 +30,7 @@ from defshade_cli.usd.linking import link
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.palette import Palette
 from defshade_cli.usd.settings import read_settings
+from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.tessellation import Tessellation
 from defshade_cli.usd.traversal import Traversal
 from defshade_cli.usd.unresolved import find_unresolved
@@ -62,6 +65,8 @@ class StageReader:
         self._extras = extras
         self._memory = Memory(stage, extras)
         self._tessellation = Tessellation()
+        self._levels: dict[str, int] = {}
+        self._lights: dict[str, Light] = {}
         self._settings = read_settings(stage)
         self._cameras = find_cameras(stage)
         self._issues = tuple(arc.unsupported for arc in find_unresolved(stage))
@@ -83,9 +88,21 @@ class StageReader:
         to draw at any time, StageError for a camera that sees nothing.
         """
         time = Usd.TimeCode.Default() if frame is None else Usd.TimeCode(frame)
+        self._levels.clear()
         with facts.gathered_diagnostics():
             scene = self._read(frame, time)
         return _lit(scene)
+
+    def read_shutter(self, scene: Scene, count: int) -> Iterator[Scene]:
+        """The frame of `scene` again and again, at `count` times of its shutter in turn, without end.
+
+        Surfaces are refined as often as at the frame itself.
+        """
+        assert scene.frame is not None
+        for offset in cycle(scene.camera.shutter_times(count)):
+            time = Usd.TimeCode(scene.frame + offset)
+            with facts.silence():
+                yield _lit(self._read(scene.frame, time))
 
     def _read(self, frame: float | None, time: Usd.TimeCode) -> Scene:
         traversal = Traversal(self._stage, self._memory, time, self._purposes)
@@ -97,7 +114,8 @@ class StageReader:
         gprims = self._tessellate(drawn, camera)
         palette = Palette(self._memory, time)
         meshes: dict[Mesh, int] = {}
-        lights, drawables = link(self._stage, list(_lights(pieces)), list(_drawables(drawn, gprims, meshes, palette)))
+        shining = self._shared_lights(_lights(pieces))
+        lights, drawables = link(self._stage, shining, list(_drawables(drawn, gprims, meshes, palette)))
         mended = dict.fromkeys(issue for gprim in gprims.values() for issue in gprim.issues)
         return Scene(
             name=facts.stage_name(self._stage),
@@ -111,6 +129,7 @@ class StageReader:
             meters_per_unit=facts.meters_per_unit(self._stage),
             up_axis=facts.up_axis(self._stage),
             frame=frame,
+            moves=frame is not None and camera.shutter[0] < camera.shutter[1] and self._may_change,
             frames_per_second=facts.frames_per_second(self._stage),
             resolution=self._settings.resolution,
             pixel_aspect=self._settings.pixel_aspect_for(camera),
@@ -119,6 +138,16 @@ class StageReader:
             assets=read_assets(self._stage, _paths(drawables)) if self._extras.assets else {},
             rendering_space=self._settings.rendering_space,
         )
+
+    @cached_property
+    def _may_change(self) -> bool:
+        return facts.may_change(self._stage)
+
+    def _shared_lights(self, lights: Iterable[Light]) -> list[Light]:
+        """Lights that are as they were when last read are the same objects."""
+        found = [shared(light, self._lights.get(light.path)) for light in lights]
+        self._lights = {light.path: light for light in found}
+        return found
 
     def _read_camera(
         self, time: Usd.TimeCode, drawn: Iterable[PlacedSurface]
@@ -135,7 +164,9 @@ class StageReader:
         aspect = width * self._settings.pixel_aspect_for(camera) / height
         view = View(camera.conformed(aspect, self._settings.conform), height)
         placed = ((surface, piece.root_from_object) for piece, surface in drawn)
-        levels = choose_levels(placed, self._complexity, view)
+        if not self._levels:
+            self._levels = {s.path: level for s, level in choose_levels(placed, self._complexity, view).items()}
+        levels = {surface: self._levels.get(surface.path, 0) for _, surface in drawn}
         return {surface: self._tessellation.at_level(surface, level) for surface, level in levels.items()}
 
 
