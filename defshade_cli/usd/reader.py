@@ -28,6 +28,7 @@ from defshade_cli.usd.instancing import Piece
 from defshade_cli.usd.light import camera_light
 from defshade_cli.usd.linking import link
 from defshade_cli.usd.memory import Memory
+from defshade_cli.usd.mesh_light import Glow, Glows, glowing_lights, shown_material
 from defshade_cli.usd.palette import Palette
 from defshade_cli.usd.settings import read_settings
 from defshade_cli.usd.sharing import shared
@@ -38,6 +39,7 @@ from defshade_cli.usd.unresolved import find_unresolved
 log = logging.getLogger("defshade")
 
 PlacedSurface = tuple[Piece, Surface]
+Glowing = tuple[Glow, tuple[Light, ...]]
 
 
 class StageReader:
@@ -114,8 +116,10 @@ class StageReader:
         gprims = self._tessellate(drawn, camera)
         palette = Palette(self._memory, time)
         meshes: dict[Mesh, int] = {}
-        shining = self._shared_lights(_lights(pieces))
-        lights, drawables = link(self._stage, shining, list(_drawables(drawn, gprims, meshes, palette)))
+        glowing = _glowing(drawn, gprims, traversal.glows, palette)
+        shown = [*_drawables(drawn, gprims, meshes, palette, glowing)]
+        shining = self._shared_lights([*_lights(pieces), *_all(glowing)])
+        lights, drawables = link(self._stage, shining, shown)
         mended = dict.fromkeys(issue for gprim in gprims.values() for issue in gprim.issues)
         return Scene(
             name=facts.stage_name(self._stage),
@@ -123,6 +127,7 @@ class StageReader:
             drawables=drawables,
             materials=palette.materials,
             lights=lights,
+            portals=tuple(traversal.portals),
             camera=camera,
             cameras=self._cameras,
             unsupported=(*self._issues, *traversal.issues, *mended, *palette.issues, *camera_issues),
@@ -177,14 +182,23 @@ def _drawn(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[PlacedS
 
 
 def _drawables(
-    drawn: Iterable[PlacedSurface], gprims: Mapping[Surface, Gprim], meshes: dict[Mesh, int], palette: Palette
+    drawn: Iterable[PlacedSurface],
+    gprims: Mapping[Surface, Gprim],
+    meshes: dict[Mesh, int],
+    palette: Palette,
+    glowing: Mapping[Piece, Glowing],
 ) -> Iterator[Drawable]:
     """What is drawn; `meshes` takes the meshes, each with its number."""
     for piece, surface in drawn:
         gprim = gprims[surface]
         if not gprim.groups:
             continue
-        subsets = (Subset(palette.number(piece.bindings[g.path]), g.first, g.count) for g in gprim.groups)
+        materials = [palette.material(piece.bindings[group.path]) for group in gprim.groups]
+        if piece in glowing:
+            glow, lights = glowing[piece]
+            materials = [shown_material(material, glow, lights[0]) for material in materials]
+        numbered = zip(gprim.groups, map(palette.number_of, materials), strict=True)
+        subsets = (Subset(number, group.first, group.count) for group, number in numbered)
         yield Drawable(
             mesh=meshes.setdefault(gprim.mesh, len(meshes)),
             world_from_object=piece.root_from_object,
@@ -199,6 +213,22 @@ def _drawables(
 def _paths(drawables: Iterable[Drawable]) -> dict[str, None]:
     """Of every prim that is drawn, each once."""
     return dict.fromkeys(path for drawable in drawables for path in drawable.paths)
+
+
+def _glowing(
+    drawn: Iterable[PlacedSurface], gprims: Mapping[Surface, Gprim], glows: Glows, palette: Palette
+) -> dict[Piece, Glowing]:
+    """The surfaces that are lights, and these."""
+    found = ((piece, gprims[surface], glows[surface.path]) for piece, surface in drawn if surface.path in glows)
+    return {
+        piece: (glow, tuple(glowing_lights(piece, gprim, glow, palette.material)))
+        for piece, gprim, glow in found
+        if gprim.groups and len(piece.root_from_object)
+    }
+
+
+def _all(glowing: Mapping[Piece, Glowing]) -> Iterator[Light]:
+    return (light for _, lights in glowing.values() for light in lights)
 
 
 def _lights(pieces: Iterable[Piece]) -> Iterator[Light]:
