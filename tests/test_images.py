@@ -43,6 +43,7 @@ CASES: dict[str, tuple[str, float | None, RenderSettings]] = {
     "purposes.guide": ("purposes", None, replace(SETTINGS, purposes=("default", "proxy", "guide"))),
     "subdivision.low": ("subdivision", None, replace(SETTINGS, complexity="low")),
     "light_rect_texture.32": ("light_rect_texture", None, replace(SETTINGS, samples=32)),
+    "motion_blur.16": ("motion_blur", 4.0, replace(SETTINGS, samples=16)),
     "showcase.8": ("showcase", None, replace(SETTINGS, samples=8)),
 }
 """Reference → stage, frame, settings."""
@@ -90,7 +91,9 @@ def _draw(pipeline: Pipeline, stage: str, frame: float | None, settings: RenderS
     opened = open_stage(resources.SCENES / f"{stage}.usda")
     reader = StageReader(opened, purposes=settings.purposes, complexity=settings.complexity, size=settings.size)
     scene = reader.read(reader.first_frame() if frame is None else frame)
-    return pipeline.render(scene, make_plan(scene, settings))
+    plan = make_plan(scene, settings)
+    moments = ((seen, make_plan(seen, settings)) for seen in reader.read_shutter(scene, plan.moments))
+    return pipeline.render(scene, plan, moments)
 
 
 def _outliers(image: NDArray, reference: NDArray) -> float:
