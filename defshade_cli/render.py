@@ -20,7 +20,7 @@ from defshade_cli.image.film import Film
 from defshade_cli.image.layers import resolve
 from defshade_cli.image.layers.extras import extras_of
 from defshade_cli.passes.pipeline import Pipeline
-from defshade_cli.plan import Plan, make_plan
+from defshade_cli.plan import Plan, make_plan, plan_moments
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Composition, RenderJob, RenderSettings
 from defshade_cli.usd.reader import StageReader
@@ -165,10 +165,12 @@ def _render_frame(
     with _timed(seconds, "context"):
         pipeline = renderer.pipeline(job.device)
     with _timed(seconds, "draw"):
-        moments = ((seen, make_plan(seen, job.settings)) for seen in reader.read_shutter(scene, plan.moments))
+        moments = plan_moments(scene, plan, reader.read_shutter(scene, plan.moments), job.settings)
         film = pipeline.render(scene, plan, moments)
     with _timed(seconds, "write"):
-        film = replace(film, metadata=provenance | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of})
+        film = replace(
+            film, metadata=provenance | film.metadata | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of}
+        )
         paths = frame_paths(job, frame, reader.camera_name)
         written = tuple(file for path in paths for file in write(film, job.output, path))
     return FrameResult(frame, written, film=film, plan=plan, seconds=seconds)
@@ -176,7 +178,6 @@ def _render_frame(
 
 def _cost(plan: Plan, seconds: float) -> dict[str, Any]:
     return {
-        "samples": plan.samples,
         "layout": plan.layout,
         "shading": plan.shading,
         "seconds": round(seconds, 4),

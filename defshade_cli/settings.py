@@ -25,6 +25,8 @@ COMPRESSIONS: tuple[Compression, ...] = ("zip", "zips", "piz", "dwaa", "none")
 FILTERS: dict[Filter, float] = {"box": 1.0, "gaussian": 2.0, "blackman-harris": 3.0}
 """Widths in pixels, from end to end, where none is asked: those of Arnold."""
 BITS: tuple[Bits, ...] = (8, 16)
+MOST_SAMPLES = 4096
+"""Of a render that the error or the time ends."""
 PURPOSES = ("default", "render", "proxy", "guide")
 
 
@@ -83,7 +85,10 @@ class RenderSettings:
     width: pixels; the height then follows the camera's aspect. At most one of size and width is given.
     crop: (x, y, width, height) of the pixels that are rendered, from the image's top left corner, which they may leave;
         None follows the stage's RenderSettings, then the whole image.
-    samples: jittered samples a pixel; 1 is a sample at the pixel's centre.
+    samples: jittered samples a pixel, or the most of them; 1 is a sample at the pixel's centre. None is 1, or
+        MOST_SAMPLES where the error or the time ends the render.
+    max_error: relative standard error to render to: passes/convergence.py.
+    time_limit: seconds to draw a frame in; the sample that passes them is finished.
     cryptomatte_levels: ids a pixel of a Cryptomatte holds, the greatest coverage first; even.
     filter: the samples of a pixel fall by it.  filter_width: pixels from end to end; None for the filter's own.
     render_space: the scene-linear colour space of the image, by a name that the OCIO config knows; None follows the
@@ -99,7 +104,9 @@ class RenderSettings:
     size: tuple[int, int] | None = None
     width: int | None = None
     crop: tuple[int, int, int, int] | None = None
-    samples: int = 1
+    samples: int | None = None
+    max_error: float | None = None
+    time_limit: float | None = None
     filter: Filter = "box"
     filter_width: float | None = None
     cryptomatte_levels: int = 6
@@ -115,6 +122,12 @@ class RenderSettings:
     complexity: Complexity = "auto"
     background: bool = True
     motion_blur: bool = True
+
+    @property
+    def most_samples(self) -> int:
+        """`samples`, or what stands for it."""
+        open_ended = self.max_error is not None or self.time_limit is not None
+        return self.samples or (MOST_SAMPLES if open_ended else 1)
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from defshade_cli.image.files import write
 from defshade_cli.image.film import Film
 from defshade_cli.image.reading import read
 from defshade_cli.passes.pipeline import Pipeline
-from defshade_cli.plan import make_plan
+from defshade_cli.plan import make_plan, plan_moments
 from defshade_cli.settings import OutputSettings, RenderSettings
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.stage import open_stage
@@ -92,7 +92,7 @@ def _draw(pipeline: Pipeline, stage: str, frame: float | None, settings: RenderS
     reader = StageReader(opened, purposes=settings.purposes, complexity=settings.complexity, size=settings.size)
     scene = reader.read(reader.first_frame() if frame is None else frame)
     plan = make_plan(scene, settings)
-    moments = ((seen, make_plan(seen, settings)) for seen in reader.read_shutter(scene, plan.moments))
+    moments = plan_moments(scene, plan, reader.read_shutter(scene, plan.moments), settings)
     return pipeline.render(scene, plan, moments)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from defshade_cli import render
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.passes.pipeline import Pipeline
-from defshade_cli.plan import make_plan
+from defshade_cli.plan import make_plan, plan_moments
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderSettings
@@ -68,7 +68,7 @@ def _beauty(pipeline: Pipeline, reader: StageReader, samples: int, **options: ob
     scene = reader.read(1.0)
     settings = RenderSettings(size=(WIDTH, HEIGHT), samples=samples, **options)  # type: ignore[arg-type]
     plan = make_plan(scene, settings)
-    moments = ((seen, make_plan(seen, settings)) for seen in reader.read_shutter(scene, plan.moments))
+    moments = plan_moments(scene, plan, reader.read_shutter(scene, plan.moments), settings)
     return pipeline.render(scene, plan, moments).layers["beauty"]
 
 

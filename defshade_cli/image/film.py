@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,28 @@ from numpy.typing import NDArray
 from defshade_cli.image.layers import LAYERS, Layer
 from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.scene.camera import Camera
+
+StopReason = Literal["samples", "max-error", "time-limit"]
+
+
+@dataclass(frozen=True, slots=True)
+class Sampling:
+    """Samples that pixels got, and why they got no more.
+
+    error: relative standard error that 95 % of the tiles keep; None where it is not known.
+    """
+
+    least: int
+    mean: float
+    most: int
+    error: float | None = None
+    stopped_by: StopReason = "samples"
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """For the file's header and `--stats`."""
+        facts = {"samples": self.most, "samples_min": self.least, "samples_mean": round(self.mean, 2)}
+        return facts | {"error": self.error, "stopped_by": self.stopped_by}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

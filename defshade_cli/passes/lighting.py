@@ -25,6 +25,7 @@ from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.linking import ALL_LINKED
+from defshade_cli.passes.screen import Screen
 from defshade_cli.passes.shadows import ShadowAtlas
 from defshade_cli.passes.tables import NO_TABLES, LightTables
 from defshade_cli.passes.volumes import cone_volume, sphere_volume
@@ -83,20 +84,20 @@ class LightingVariant:
 class LightingPass:
     """Compiled for one variant."""
 
-    def __init__(self, gpu: Gpu, variant: LightingVariant) -> None:
-        self._context = gpu.context
+    def __init__(self, gpu: Gpu, variant: LightingVariant, screen: Screen) -> None:
+        self._context, self._screen = gpu.context, screen
         generated = {
             "generated/planes.glsl": read_source(variant.planes, variant.layout),
             "generated/outputs.glsl": outputs_source(variant.outputs, variant.groups),
         }
         emission = gpu.shaders.program("screen.vert", "emission.frag", defines=variant.defines, generated=generated)
-        self._emission = gpu.keep(gpu.context.vertex_array(emission, []))
+        self._emission = screen.array(emission)
         self._volumes: dict[Volume, moderngl.VertexArray] = {}
         for volume in variant.volumes:
             defines = variant.defines + ["VOLUME_QUAD"] * (volume == "quad")
             files = (f"light_{volume}.vert", "lighting.frag")
             program = gpu.shaders.program(*files, defines=defines, generated=generated)
-            self._volumes[volume] = _volume_array(gpu, volume, program)
+            self._volumes[volume] = screen.array(program) if volume == "quad" else _volume_array(gpu, volume, program)
 
     def begin(self, gbuffer: GBuffer, targets: LightTargets) -> None:
         """Emission and coverage: the sample's radiance is overwritten, and the group of what is emitted grows."""
@@ -104,12 +105,12 @@ class LightingPass:
         targets.radiance.framebuffer.depth_mask = False
         self._context.enable_only(moderngl.NOTHING)
         gbuffer.bind(self._emission.program)
-        self._emission.render(vertices=3)
+        self._screen.draw(self._emission)
         if DEFAULT_GROUP in targets.sums:
             targets.sums[DEFAULT_GROUP].framebuffer.use()
             self._context.enable_only(moderngl.BLEND)
             self._context.blend_func = moderngl.ONE, moderngl.ONE
-            self._emission.render(vertices=3)
+            self._screen.draw(self._emission)
 
     def add(
         self,
@@ -129,19 +130,23 @@ class LightingPass:
             targets.framebuffers[groups].use()
             maps = shadows.depth if shadows else None
             gbuffer.bind(self._volumes[volume].program, shadow_atlas=maps, ies_tables=tables.candela)
-            self._draw_volumes(volume, alike.index((volume, groups)), alike.count((volume, groups)))
+            draw = self._draw_quads if volume == "quad" else self._draw_volumes
+            draw(self._volumes[volume], alike.index((volume, groups)), alike.count((volume, groups)))
         self._context.disable_direct(DEPTH_CLAMP)
 
-    def _draw_volumes(self, volume: Volume, first: int, count: int) -> None:
-        array, local = self._volumes[volume], moderngl.DEPTH_TEST | moderngl.CULL_FACE
-        self._context.enable_only(moderngl.BLEND | (moderngl.NOTHING if volume == "quad" else local))
+    def _draw_quads(self, array: moderngl.VertexArray, first: int, count: int) -> None:
+        self._context.enable_only(moderngl.BLEND)
+        for light in range(first, first + count):
+            array.program["first_light"] = light
+            self._screen.draw(array)
+
+    def _draw_volumes(self, array: moderngl.VertexArray, first: int, count: int) -> None:
+        self._context.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         array.program["first_light"] = first
-        array.render(vertices=3 if volume == "quad" else -1, instances=count)
+        array.render(instances=count)
 
 
 def _volume_array(gpu: Gpu, volume: Volume, program: moderngl.Program) -> moderngl.VertexArray:
-    if volume == "quad":
-        return gpu.keep(gpu.context.vertex_array(program, []))
     corners, triangles = sphere_volume() if volume == "sphere" else cone_volume()
     vertices = gpu.keep(gpu.context.buffer(corners.tobytes()))
     indices = gpu.keep(gpu.context.buffer(triangles.tobytes()))

@@ -47,6 +47,7 @@ def explain(plan: Plan) -> Iterator[Decision]:
     if plan.data_layers:
         jittered, shared = "the beauty's is jittered, quantised or dithered", "the beauty's own float sample serves"
         yield _kept("data GBuffer", plan.data_pass, jittered if plan.sampled else "as asked", shared)
+    yield _kept("error estimate", plan.tracks_error, "as asked", "nothing needs it")
     if not plan.lit:
         yield Decision("lighting", "skipped", "no layer needs it")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -15,6 +15,7 @@ from defshade_cli.image.render_space import RenderSpace, find_render_space
 from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.groups import light_groups, light_outputs
 from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
+from defshade_cli.plan.moments import count_moments, share_moments
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import DomeLight
@@ -23,12 +24,6 @@ from defshade_cli.scene.window import DataWindow, from_ndc
 from defshade_cli.settings import FILTERS, Complexity, Filter, Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
 from defshade_cli.units import exposure_scale
-
-MOST_MOMENTS = 32
-"""Times of the shutter at which a frame is read."""
-
-_SAMPLES_A_CYCLE = 256
-"""Samples after which the moments come round again, for a render that may stop early has to have seen all."""
 
 _MARGIN = 1e-3  # relative slack around bounds that float32 may round outwards
 
@@ -42,8 +37,8 @@ class Plan:
     clip: (near, far), the camera's range tightened to the geometry.
     render_space: of light and reflectance.
     exposure: linear, the camera's and the settings' together.
+    samples: a pixel at most.  max_error, time_limit: of RenderSettings.  filter_width: pixels.
     moments: of the shutter that the samples see, in turn; 0 without motion blur.
-    filter_width: pixels.
     planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
     lights: sorted quads, spheres, cones.
     shadows: some light casts them.  shadow_linked: in some light not all geometry does.
@@ -65,6 +60,8 @@ class Plan:
     layout: Layout
     shading: Shading
     samples: int
+    max_error: float | None
+    time_limit: float | None
     moments: int
     filter: Filter
     filter_width: float
@@ -94,9 +91,16 @@ class Plan:
         return any(LAYERS[name].source == "lighting" for name in self.layers)
 
     @property
+    def tracks_error(self) -> bool:
+        """Is the error of the mean asked for?"""
+        asked = self.max_error is not None or self.time_limit is not None or "variance" in self.layers
+        return self.sampled and self.samples > 1 and asked
+
+    @property
     def samples_a_moment(self) -> int:
         """How many samples in a row see the same moment."""
-        return math.ceil(min(self.samples, _SAMPLES_A_CYCLE) / self.moments)
+        may_stop = self.max_error is not None or self.time_limit is not None
+        return share_moments(self.samples, self.moments, may_stop=may_stop)
 
     @property
     def sampled(self) -> bool:
@@ -153,7 +157,7 @@ class Plan:
         """Names of the passes in the order of the pipeline."""
         before = ("gbuffer", "emission", *("environment",) * bool(self.domes), *("shadow maps",) * self.shadows)
         lighting = before + tuple(f"light {volume}" for volume in self.volumes)
-        accumulation = ("accumulation",) * (self.samples > 1)
+        accumulation = ("accumulation",) * (self.samples > 1) + ("batch means",) * self.tracks_error
         return (lighting + accumulation if self.sampled else ()) + ("data gbuffer",) * self.data_pass
 
     @property
@@ -184,8 +188,10 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         exposure=exposure,
         layout=settings.layout,
         shading=settings.shading,
-        samples=settings.samples,
-        moments=_moments(scene, settings.samples) if settings.motion_blur else 0,
+        samples=settings.most_samples,
+        max_error=settings.max_error,
+        time_limit=settings.time_limit,
+        moments=count_moments(scene, settings),
         filter=settings.filter,
         filter_width=settings.filter_width or FILTERS[settings.filter],
         layers=layers,
@@ -205,11 +211,20 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     )
 
 
-def _moments(scene: Scene, samples: int) -> int:
-    """Every sample sees its own moment, up to MOST_MOMENTS; one sample sees the frame."""
-    if samples == 1 or not scene.moves:
-        return 0
-    return math.ceil(samples / math.ceil(samples / MOST_MOMENTS)) if samples <= _SAMPLES_A_CYCLE else MOST_MOMENTS
+Moment = tuple[Scene, Plan]
+"""What is there while the shutter is open, at one time."""
+
+
+def plan_moments(scene: Scene, plan: Plan, seen: Iterator[Scene], settings: RenderSettings) -> Iterator[Moment]:
+    """What the samples see in turn: `seen` with plans that fill the same planes.
+
+    Where a matte is asked for, which counts what the frame draws, a moment that draws something else shows the frame.
+    """
+    for moment in seen:
+        if plan.mattes and not moment.draws_like(scene):
+            yield scene, plan
+        else:
+            yield moment, replace(make_plan(moment, settings), planes=plan.planes)
 
 
 def _seen_lights(lights: tuple[PlannedLight, ...], layers: tuple[str, ...]) -> tuple[PlannedLight, ...]:
@@ -233,7 +248,7 @@ def _divide_planes(
     data = named_planes(row.source for row in rows)
     both = named_planes(plane.name for plane in (*lit, *data))
     sampled, has_data = any(row.is_sampled for row in rows), not all(row.is_sampled for row in rows)
-    exact = settings.layout == "float" and settings.samples == 1 and not cutout and len(both) <= MOST_TARGETS
+    exact = settings.layout == "float" and settings.most_samples == 1 and not cutout and len(both) <= MOST_TARGETS
     data_pass = has_data and not (sampled and exact)
     return (lit if data_pass or not has_data else both), data, data_pass
 
