@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.planes import MOST_TARGETS, Plane, named_planes, needed_planes
-from defshade_cli.image.layers import LAYERS, resolve
-from defshade_cli.image.render_space import RenderSpace, find_render_space
+from defshade_cli.image.layers import BEAUTY, LAYERS, resolve
+from defshade_cli.image.ocio import find_render_space
+from defshade_cli.image.render_space import RenderSpace
 from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.groups import light_groups, light_outputs
 from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
@@ -168,7 +169,7 @@ class Plan:
 
 def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     """Decide. Raises UsageError for a layer or a render space that does not exist, or an image without pixels."""
-    layers = resolve(settings.layers)
+    layers = resolve(settings.layers or (BEAUTY,))
     display = image_size(scene.camera.aspect, settings.size, settings.width, scene.resolution)
     display_camera = scene.camera.conformed(display[0] * scene.pixel_aspect / display[1], scene.conform)
     window = DataWindow(*settings.crop) if settings.crop else from_ndc(scene.data_window, display)

@@ -45,10 +45,13 @@ Glowing = tuple[Glow, tuple[Light, ...]]
 class StageReader:
     """Reads frames of one stage. What does not change over time is read once, and stays the same object.
 
-    camera: path or name; without it the rule of usd/camera.py picks.  purposes: of the geometry that is drawn.
+    camera: path or name; without it the rule of usd/camera.py picks.
+    purposes: of the geometry that is drawn; without them those of the render settings.
+    render_settings, product: paths of their prims; settings are found as usd/products.py does.
     complexity: of subdivision surfaces; for `auto` it matters how large the image is, see scene.camera.image_size.
     extras: what only some layers need.
-    Raises PrimNotFound for a camera that the stage lacks.
+    beside: a reader of the same stage, whose memory is shared.
+    Raises PrimNotFound for a camera or render settings that the stage lacks.
     """
 
     def __init__(
@@ -56,20 +59,23 @@ class StageReader:
         stage: Usd.Stage,
         *,
         camera: str | None = None,
-        purposes: Sequence[str] = ("default", "render"),
+        purposes: Sequence[str] | None = None,
+        render_settings: str | None = None,
+        product: str = "",
         complexity: Complexity = "auto",
         size: tuple[int, int] | None = None,
         width: int | None = None,
         extras: Extras = NO_EXTRAS,
+        beside: StageReader | None = None,
     ) -> None:
-        self._stage, self._purposes = stage, tuple(purposes)
         self._complexity, self._size, self._width = complexity, size, width
         self._extras = extras
-        self._memory = Memory(stage, extras)
-        self._tessellation = Tessellation()
+        self._memory: Memory = beside._memory if beside else Memory(stage, extras)
+        self._tessellation: Tessellation = beside._tessellation if beside else Tessellation()
+        self._settings = read_settings(stage, render_settings, product)
+        self._stage, self._purposes = stage, tuple(purposes or self._settings.purposes)
         self._levels: dict[str, int] = {}
         self._lights: dict[str, Light] = {}
-        self._settings = read_settings(stage)
         self._cameras = find_cameras(stage)
         self._issues = tuple(arc.unsupported for arc in find_unresolved(stage))
         self._camera = choose_camera(stage, self._cameras, camera, self._settings.camera)

@@ -15,6 +15,19 @@ ALIASES: dict[str, str] = {
     "color": "beauty",
     "cameraDepth": "depth",
     "primvars:st": "uv",
+    # RenderMan
+    "Ci": "beauty",
+    "a": "alpha",
+    "z": "depth",
+    "Nn": "normal",
+    # Karma
+    "C": "beauty",
+    "ray:hitP": "position",
+    "ray:hitN": "normal",
+    "ray:hitPz": "depth",
+    # files
+    "rgba": "beauty",
+    "rgb": "beauty",
     # Arnold
     "RGBA": "beauty",
     "A": "alpha",
