@@ -21,6 +21,7 @@ from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
+from defshade_cli.scene.shadow import PLAIN
 from defshade_cli.scene.window import DataWindow, from_ndc
 from defshade_cli.settings import FILTERS, Complexity, Filter, Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
@@ -141,6 +142,11 @@ class Plan:
     @property
     def domes(self) -> tuple[PlannedLight, ...]:
         return tuple(planned for planned in self.lights if isinstance(planned.light, DomeLight))
+
+    @property
+    def shadow_styles(self) -> bool:
+        """Are some shadows other than black, or do they end?"""
+        return self.shadows and any(p.light.casts_shadow and p.light.shadow != PLAIN for p in self.lights)
 
     @property
     def profiles(self) -> tuple[IesProfile, ...]:

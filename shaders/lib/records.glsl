@@ -79,6 +79,10 @@ struct Light {
     vec3 up;
     uint ies_table;            // its layer; NO_IES for none
     uint first_link;           // bits of the link sets that it lights: lib/linking.glsl
+    vec3 shadow_color;         // what a full shadow leaves of the light
+    float shadow_distance;     // of the farthest occluder; negative for no limit
+    float shadow_fading;       // depth of the zone before it in which shadows fade
+    float shadow_gamma;
     vec2 ies_vertical;         // the profile is read at x * angle + y radians
 };
 
@@ -87,4 +91,5 @@ struct ShadowMap {
     vec4 tile;                 // place in the atlas: offset and size, texture coordinates
     float texel;               // width of a texel one unit ahead; of every texel for a distant light
     float resolution;          // texels a side
+    vec2 depth_coefficients;   // depth z: 1 / z, or z for a distant light, = x * stored + y
 };
