@@ -156,8 +156,9 @@ def _render_image(shot: Shot, opened: OpenJob, renderer: Renderer, command: str)
     if is_done(job, files, made_of):
         return ImageResult(files, skipped=True)
     seconds: dict[str, float] = {}
+    reader = opened.reader(shot.product)
     with _timed(seconds, "read"):
-        scene = opened.reader(shot.product).read(shot.frame)
+        scene = reader.read(shot.frame)
     with _timed(seconds, "plan"):
         plan = make_plan(scene, job.settings)
     with _timed(seconds, "context"):
