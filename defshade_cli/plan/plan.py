@@ -218,11 +218,11 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     )
 
 
-Moment = tuple[Scene, Plan]
+ShutterSample = tuple[Scene, Plan]
 """What is there while the shutter is open, at one time."""
 
 
-def plan_moments(scene: Scene, plan: Plan, seen: Iterator[Scene], settings: RenderSettings) -> Iterator[Moment]:
+def plan_moments(scene: Scene, plan: Plan, seen: Iterator[Scene], settings: RenderSettings) -> Iterator[ShutterSample]:
     """What the samples see in turn: `seen` with plans that fill the same planes.
 
     Where a matte is asked for, which counts what the frame draws, a moment that draws something else shows the frame.

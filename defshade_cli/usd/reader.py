@@ -17,6 +17,7 @@ from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import UNBOUND
+from defshade_cli.scene.motion import Moment, moment_of
 from defshade_cli.scene.scene import Scene, Unsupported
 from defshade_cli.settings import Complexity
 from defshade_cli.usd import stage as facts
@@ -96,9 +97,12 @@ class StageReader:
         to draw at any time, StageError for a camera that sees nothing.
         """
         time = Usd.TimeCode.Default() if frame is None else Usd.TimeCode(frame)
-        self._levels.clear()
         with facts.gathered_diagnostics():
-            scene = self._read(frame, time)
+            levels = self._levels = {}
+            scene = self._read(frame, time, levels)
+            if self._extras.motion and frame is not None:
+                neighbours = tuple(self._moment(scene, frame + step, levels) for step in (-1.0, 1.0))
+                scene = replace(scene, neighbours=neighbours)
         return _lit(scene)
 
     def read_shutter(self, scene: Scene, count: int) -> Iterator[Scene]:
@@ -110,16 +114,22 @@ class StageReader:
         for offset in cycle(scene.camera.shutter_times(count)):
             time = Usd.TimeCode(scene.frame + offset)
             with facts.silence():
-                yield _lit(self._read(scene.frame, time))
+                yield _lit(self._read(scene.frame, time, self._levels))
 
-    def _read(self, frame: float | None, time: Usd.TimeCode) -> Scene:
+    def _moment(self, scene: Scene, frame: float, levels: dict[str, int]) -> Moment:
+        """What `scene` has, as it is at another frame, refined alike."""
+        then = self._read(frame, Usd.TimeCode(frame), levels)
+        return moment_of(scene.drawables, scene.meshes, then.camera, then.drawables, then.meshes)
+
+    def _read(self, frame: float | None, time: Usd.TimeCode, levels: dict[str, int]) -> Scene:
+        """levels: of refinement by path of the surface; those that are missing are chosen, and put in."""
         traversal = Traversal(self._stage, self._memory, time, self._purposes)
         pieces = traversal.read_stage()
         drawn = tuple(_drawn(pieces, self._purposes))
         if not drawn and not traversal.dormant:
             raise EmptyStage(_empty(self._stage, traversal.issues))
         camera, camera_issues = self._read_camera(time, drawn)
-        gprims = self._tessellate(drawn, camera)
+        gprims = self._tessellate(drawn, camera, levels)
         palette = Palette(self._memory, time)
         meshes: dict[Mesh, int] = {}
         glowing = _glowing(drawn, gprims, traversal.glows, palette)
@@ -170,15 +180,18 @@ class StageReader:
         camera, issues = read_camera(self._camera, time)
         return self._settings.applied_to(camera), issues
 
-    def _tessellate(self, drawn: Iterable[PlacedSurface], camera: Camera) -> dict[Surface, Gprim]:
+    def _tessellate(
+        self, drawn: Iterable[PlacedSurface], camera: Camera, levels: dict[str, int]
+    ) -> dict[Surface, Gprim]:
         width, height = image_size(camera.aspect, self._size, self._width, self._settings.resolution)
         aspect = width * self._settings.pixel_aspect_for(camera) / height
         view = View(camera.conformed(aspect, self._settings.conform), height)
         placed = ((surface, piece.root_from_object) for piece, surface in drawn)
-        if not self._levels:
-            self._levels = {s.path: level for s, level in choose_levels(placed, self._complexity, view).items()}
-        levels = {surface: self._levels.get(surface.path, 0) for _, surface in drawn}
-        return {surface: self._tessellation.at_level(surface, level) for surface, level in levels.items()}
+        chosen = choose_levels(placed, self._complexity, view)
+        return {
+            surface: self._tessellation.at_level(surface, levels.setdefault(surface.path, level))
+            for surface, level in chosen.items()
+        }
 
 
 def _drawn(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[PlacedSurface]:

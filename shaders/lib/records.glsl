@@ -19,6 +19,12 @@ struct Instance {
     uint link_set;
 };
 
+struct Motion {
+    mat4 clip_before_from_object;
+    mat4 clip_now_from_object;
+    mat4 clip_after_from_object;
+};
+
 struct Material {
     vec3 diffuse_color;
     float metallic;
