@@ -17,6 +17,7 @@ from defshade_cli.gpu.residence import DrawList
 from defshade_cli.gpu.targets import Target, allocate
 from defshade_cli.gpu.textures import textures_source
 from defshade_cli.image.render_space import REC709, RenderSpace
+from defshade_cli.passes.screen import TileMask
 from defshade_cli.settings import Layout
 
 _CLIP_DISTANCE = 0x3000
@@ -85,24 +86,32 @@ class GBufferPass:
             "gbuffer.vert", "gbuffer.frag", defines=variant.defines, generated=generated
         )
 
-    def draw(self, draws: DrawList, gbuffer: GBuffer, clipping_planes: NDArray[np.float64]) -> None:
+    def draw(
+        self, draws: DrawList, gbuffer: GBuffer, mask: TileMask, planes: NDArray[np.float64], *, whole: bool = False
+    ) -> None:
         """All of `draws` with the bound View, one multi-draw; both sides of every face.
 
-        clipping_planes: (N, 4) in relative space, as many as the variant has.
+        Under the mask the depth is the background's afterwards, and the planes are undefined unless `whole`.
+        planes: (N, 4) that clip, over relative positions, as many as the variant has.
         """
         standard = uses_standard_depth(gbuffer.layout)
+        nearest, background = (0.0, 1.0) if standard else (1.0, 0.0)
         framebuffer = gbuffer.target.framebuffer
         framebuffer.use()
-        framebuffer.clear(depth=1.0 if standard else 0.0)
+        framebuffer.clear(depth=background)
         for attachment in integer_attachments(gbuffer.planes, gbuffer.layout):
             self._gpu.clear_integers(attachment)
+        if not whole:
+            mask.fill(gbuffer.target, nearest)
+        framebuffer.use()
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = "<" if standard else ">"
         draws.textures.bind(self._program)
         vertex_array = self._context.vertex_array(self._program, draws.vertices_of(self._program), draws.indices)
-        with self._clipped(clipping_planes):
+        with self._clipped(planes):
             vertex_array.render_indirect(draws.commands)
         vertex_array.release()
+        mask.fill(gbuffer.target, background)
 
     @contextmanager
     def _clipped(self, planes: NDArray[np.float64]) -> Iterator[None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -9,15 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.planes import MOST_TARGETS, Plane, named_planes, needed_planes
-from defshade_cli.image.layers import LAYERS, resolve
-from defshade_cli.image.render_space import RenderSpace, find_render_space
+from defshade_cli.image.layers import BEAUTY, LAYERS, resolve
+from defshade_cli.image.ocio import find_render_space
+from defshade_cli.image.render_space import RenderSpace
 from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.groups import light_groups, light_outputs
 from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
+from defshade_cli.plan.moments import count_moments, share_moments
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
+from defshade_cli.scene.shadow import PLAIN
 from defshade_cli.scene.window import DataWindow, from_ndc
 from defshade_cli.settings import FILTERS, Complexity, Filter, Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
@@ -35,7 +39,8 @@ class Plan:
     clip: (near, far), the camera's range tightened to the geometry.
     render_space: of light and reflectance.
     exposure: linear, the camera's and the settings' together.
-    filter_width: pixels.
+    samples: a pixel at most.  max_error, time_limit: of RenderSettings.  filter_width: pixels.
+    moments: of the shutter that the samples see, in turn; 0 without motion blur.
     planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
     lights: sorted quads, spheres, cones.
     shadows: some light casts them.  shadow_linked: in some light not all geometry does.
@@ -57,6 +62,9 @@ class Plan:
     layout: Layout
     shading: Shading
     samples: int
+    max_error: float | None
+    time_limit: float | None
+    moments: int
     filter: Filter
     filter_width: float
     layers: tuple[str, ...]
@@ -83,6 +91,18 @@ class Plan:
     def lit(self) -> bool:
         """Does any layer need the lighting?"""
         return any(LAYERS[name].source == "lighting" for name in self.layers)
+
+    @property
+    def tracks_error(self) -> bool:
+        """Is the error of the mean asked for?"""
+        asked = self.max_error is not None or self.time_limit is not None or "variance" in self.layers
+        return self.sampled and self.samples > 1 and asked
+
+    @property
+    def samples_a_moment(self) -> int:
+        """How many samples in a row see the same moment."""
+        may_stop = self.max_error is not None or self.time_limit is not None
+        return share_moments(self.samples, self.moments, may_stop=may_stop)
 
     @property
     def sampled(self) -> bool:
@@ -124,6 +144,11 @@ class Plan:
         return tuple(planned for planned in self.lights if isinstance(planned.light, DomeLight))
 
     @property
+    def shadow_styles(self) -> bool:
+        """Are some shadows other than black, or do they end?"""
+        return self.shadows and any(p.light.casts_shadow and p.light.shadow != PLAIN for p in self.lights)
+
+    @property
     def profiles(self) -> tuple[IesProfile, ...]:
         """The IES profiles of the lights, each once."""
         shapings = [planned.light.shaping for planned in self.lights]
@@ -139,7 +164,7 @@ class Plan:
         """Names of the passes in the order of the pipeline."""
         before = ("gbuffer", "emission", *("environment",) * bool(self.domes), *("shadow maps",) * self.shadows)
         lighting = before + tuple(f"light {volume}" for volume in self.volumes)
-        accumulation = ("accumulation",) * (self.samples > 1)
+        accumulation = ("accumulation",) * (self.samples > 1) + ("batch means",) * self.tracks_error
         return (lighting + accumulation if self.sampled else ()) + ("data gbuffer",) * self.data_pass
 
     @property
@@ -150,7 +175,7 @@ class Plan:
 
 def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     """Decide. Raises UsageError for a layer or a render space that does not exist, or an image without pixels."""
-    layers = resolve(settings.layers)
+    layers = resolve(settings.layers or (BEAUTY,))
     display = image_size(scene.camera.aspect, settings.size, settings.width, scene.resolution)
     display_camera = scene.camera.conformed(display[0] * scene.pixel_aspect / display[1], scene.conform)
     window = DataWindow(*settings.crop) if settings.crop else from_ndc(scene.data_window, display)
@@ -170,7 +195,10 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         exposure=exposure,
         layout=settings.layout,
         shading=settings.shading,
-        samples=settings.samples,
+        samples=settings.most_samples,
+        max_error=settings.max_error,
+        time_limit=settings.time_limit,
+        moments=count_moments(scene, settings),
         filter=settings.filter,
         filter_width=settings.filter_width or FILTERS[settings.filter],
         layers=layers,
@@ -188,6 +216,22 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         portals=len(scene.portals),
         levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None})),
     )
+
+
+ShutterSample = tuple[Scene, Plan]
+"""What is there while the shutter is open, at one time."""
+
+
+def plan_moments(scene: Scene, plan: Plan, seen: Iterator[Scene], settings: RenderSettings) -> Iterator[ShutterSample]:
+    """What the samples see in turn: `seen` with plans that fill the same planes.
+
+    Where a matte is asked for, which counts what the frame draws, a moment that draws something else shows the frame.
+    """
+    for moment in seen:
+        if plan.mattes and not moment.draws_like(scene):
+            yield scene, plan
+        else:
+            yield moment, replace(make_plan(moment, settings), planes=plan.planes)
 
 
 def _seen_lights(lights: tuple[PlannedLight, ...], layers: tuple[str, ...]) -> tuple[PlannedLight, ...]:
@@ -211,7 +255,7 @@ def _divide_planes(
     data = named_planes(row.source for row in rows)
     both = named_planes(plane.name for plane in (*lit, *data))
     sampled, has_data = any(row.is_sampled for row in rows), not all(row.is_sampled for row in rows)
-    exact = settings.layout == "float" and settings.samples == 1 and not cutout and len(both) <= MOST_TARGETS
+    exact = settings.layout == "float" and settings.most_samples == 1 and not cutout and len(both) <= MOST_TARGETS
     data_pass = has_data and not (sampled and exact)
     return (lit if data_pass or not has_data else both), data, data_pass
 
@@ -226,7 +270,7 @@ def _has_cutout(scene: Scene) -> bool:
         return True
     varying = [m.display_opacity for m in scene.meshes if m.display_opacity is not None]
     constant = [d.display_opacity for d in scene.drawables]
-    return any(m.uses_display_color for m in scene.materials) and any((o < 1.0).any() for o in varying + constant)
+    return any(m.uses_display_opacity for m in scene.materials) and any((o < 1.0).any() for o in varying + constant)
 
 
 def _tight_clip(camera: Camera, bounds: NDArray[np.float64]) -> tuple[float, float]:

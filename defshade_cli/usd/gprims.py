@@ -16,7 +16,7 @@ from pxr import Usd
 
 from defshade_cli.usd.cages import capsule_cage, cone_cage, frustum_cage, sphere_cage
 from defshade_cli.usd.polygons import Polygons
-from defshade_cli.usd.primvars import Elements, count_elements, read_display, read_uvs
+from defshade_cli.usd.primvars import DISPLAY_COLOR, Elements, count_elements, read_display, read_uvs
 from defshade_cli.usd.revolution import SEGMENTS, Strip, arc, disk, revolve, side
 from defshade_cli.usd.values import floats
 
@@ -99,7 +99,9 @@ def size_attributes(prim: Usd.Prim) -> tuple[str, ...]:
     return names
 
 
-def read_solid(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str], *, as_cage: bool = False) -> Polygons | None:
+def read_solid(
+    prim: Usd.Prim, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR, *, as_cage: bool = False
+) -> Polygons | None:
     """The gprim tessellated; None for any other type, no faces where a size is no size.
 
     as_cage: a curved solid is the cage that Hydra subdivides.
@@ -116,7 +118,7 @@ def read_solid(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str], *, as_cage
     elements = _elements(polygons)
     return replace(
         _along(polygons, _SPINE[axis]),
-        display_color=read_display(prim, "displayColor", 3, time, elements, issues),
+        display_color=read_display(prim, color, 3, time, elements, issues),
         display_opacity=read_display(prim, "displayOpacity", 1, time, elements, issues),
         uvs=read_uvs(prim, time, elements, issues),
     )
