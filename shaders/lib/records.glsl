@@ -19,6 +19,12 @@ struct Instance {
     uint link_set;
 };
 
+struct Motion {
+    mat4 clip_before_from_object;
+    mat4 clip_now_from_object;
+    mat4 clip_after_from_object;
+};
+
 struct Material {
     vec3 diffuse_color;
     float metallic;
@@ -32,6 +38,7 @@ struct Material {
     float opacity_threshold;
     uint use_specular_workflow;
     uint uses_display_color;
+    uint uses_display_opacity;
     uint one_sided;
     uint first_input;          // of its textures
     uint input_count;

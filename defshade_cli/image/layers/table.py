@@ -37,6 +37,11 @@ def _direction(name: str, space: str, source: str, summary: str) -> Layer:
     return Layer(name, _XYZ, UNIT_VECTOR, space, source, 0.0, False, summary)
 
 
+def _motion(name: str, whither: str, first: int) -> Layer:
+    summary = f"what is seen here, {whither}"
+    return Layer(name, ("U", "V"), "pixels a frame", "raster, y up", "motion", 0.0, False, summary, first)
+
+
 def _statistic(name: str, unit: str, summary: str) -> Layer:
     return Layer(name, ("Y",), unit, "none", "lighting", 0.0, True, summary)
 
@@ -80,6 +85,8 @@ ROWS: dict[str, Layer] = {
         _scalar("clearcoat", "clearcoat", "amount of clearcoat"),
         _scalar("clearcoatRoughness", "clearcoat", "perceptual roughness of the clearcoat", first=1),
         _scalar("occlusion", "occlusion", "the material's occlusion; direct light does not see it", background=1.0),
+        _motion("motionForward", "to where it is a frame later", 2),
+        _motion("motionBackward", "to where it was a frame before", 0),
         _id("primId", "visible", "the prim: the manifest has its path"),
         _id("instanceId", "visible", "which instance of the prim; −1 for what is none"),
         _id("elementId", "visible", "the face of the mesh as authored"),
