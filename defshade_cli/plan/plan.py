@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -15,6 +16,7 @@ from defshade_cli.image.render_space import RenderSpace
 from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.groups import light_groups, light_outputs
 from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
+from defshade_cli.plan.moments import count_moments, share_moments
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import DomeLight
@@ -38,6 +40,7 @@ class Plan:
     render_space: of light and reflectance.
     exposure: linear, the camera's and the settings' together.
     samples: a pixel at most.  max_error, time_limit: of RenderSettings.  filter_width: pixels.
+    moments: of the shutter that the samples see, in turn; 0 without motion blur.
     planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
     lights: sorted quads, spheres, cones.
     shadows: some light casts them.  shadow_linked: in some light not all geometry does.
@@ -61,6 +64,7 @@ class Plan:
     samples: int
     max_error: float | None
     time_limit: float | None
+    moments: int
     filter: Filter
     filter_width: float
     layers: tuple[str, ...]
@@ -93,6 +97,12 @@ class Plan:
         """Is the error of the mean asked for?"""
         asked = self.max_error is not None or self.time_limit is not None or "variance" in self.layers
         return self.sampled and self.samples > 1 and asked
+
+    @property
+    def samples_a_moment(self) -> int:
+        """How many samples in a row see the same moment."""
+        may_stop = self.max_error is not None or self.time_limit is not None
+        return share_moments(self.samples, self.moments, may_stop=may_stop)
 
     @property
     def sampled(self) -> bool:
@@ -188,6 +198,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         samples=settings.most_samples,
         max_error=settings.max_error,
         time_limit=settings.time_limit,
+        moments=count_moments(scene, settings),
         filter=settings.filter,
         filter_width=settings.filter_width or FILTERS[settings.filter],
         layers=layers,
@@ -205,6 +216,22 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         portals=len(scene.portals),
         levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None})),
     )
+
+
+ShutterSample = tuple[Scene, Plan]
+"""What is there while the shutter is open, at one time."""
+
+
+def plan_moments(scene: Scene, plan: Plan, seen: Iterator[Scene], settings: RenderSettings) -> Iterator[ShutterSample]:
+    """What the samples see in turn: `seen` with plans that fill the same planes.
+
+    Where a matte is asked for, which counts what the frame draws, a moment that draws something else shows the frame.
+    """
+    for moment in seen:
+        if plan.mattes and not moment.draws_like(scene):
+            yield scene, plan
+        else:
+            yield moment, replace(make_plan(moment, settings), planes=plan.planes)
 
 
 def _seen_lights(lights: tuple[PlannedLight, ...], layers: tuple[str, ...]) -> tuple[PlannedLight, ...]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
+from itertools import cycle
 
 import numpy as np
 from pxr import Usd
@@ -30,6 +32,7 @@ from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.mesh_light import Glow, Glows, glowing_lights, shown_material
 from defshade_cli.usd.palette import Palette
 from defshade_cli.usd.settings import read_settings
+from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.tessellation import Tessellation
 from defshade_cli.usd.traversal import Traversal
 from defshade_cli.usd.unresolved import find_unresolved
@@ -72,6 +75,8 @@ class StageReader:
         self._tessellation: Tessellation = beside._tessellation if beside else Tessellation()
         self._settings = read_settings(stage, render_settings, product)
         self._stage, self._purposes = stage, tuple(purposes or self._settings.purposes)
+        self._levels: dict[str, int] = {}
+        self._lights: dict[str, Light] = {}
         self._cameras = find_cameras(stage)
         self._issues = tuple(arc.unsupported for arc in find_unresolved(stage))
         self._camera = choose_camera(stage, self._cameras, camera, self._settings.camera)
@@ -93,12 +98,23 @@ class StageReader:
         """
         time = Usd.TimeCode.Default() if frame is None else Usd.TimeCode(frame)
         with facts.gathered_diagnostics():
-            levels: dict[str, int] = {}
+            levels = self._levels = {}
             scene = self._read(frame, time, levels)
             if self._extras.motion and frame is not None:
                 neighbours = tuple(self._moment(scene, frame + step, levels) for step in (-1.0, 1.0))
                 scene = replace(scene, neighbours=neighbours)
         return _lit(scene)
+
+    def read_shutter(self, scene: Scene, count: int) -> Iterator[Scene]:
+        """The frame of `scene` again and again, at `count` times of its shutter in turn, without end.
+
+        Surfaces are refined as often as at the frame itself.
+        """
+        assert scene.frame is not None
+        for offset in cycle(scene.camera.shutter_times(count)):
+            time = Usd.TimeCode(scene.frame + offset)
+            with facts.silence():
+                yield _lit(self._read(scene.frame, time, self._levels))
 
     def _moment(self, scene: Scene, frame: float, levels: dict[str, int]) -> Moment:
         """What `scene` has, as it is at another frame, refined alike."""
@@ -118,7 +134,8 @@ class StageReader:
         meshes: dict[Mesh, int] = {}
         glowing = _glowing(drawn, gprims, traversal.glows, palette)
         shown = [*_drawables(drawn, gprims, meshes, palette, glowing)]
-        lights, drawables = link(self._stage, [*_lights(pieces), *_all(glowing)], shown)
+        shining = self._shared_lights([*_lights(pieces), *_all(glowing)])
+        lights, drawables = link(self._stage, shining, shown)
         mended = dict.fromkeys(issue for gprim in gprims.values() for issue in gprim.issues)
         return Scene(
             name=facts.stage_name(self._stage),
@@ -133,6 +150,7 @@ class StageReader:
             meters_per_unit=facts.meters_per_unit(self._stage),
             up_axis=facts.up_axis(self._stage),
             frame=frame,
+            moves=frame is not None and camera.shutter[0] < camera.shutter[1] and self._may_change,
             frames_per_second=facts.frames_per_second(self._stage),
             resolution=self._settings.resolution,
             pixel_aspect=self._settings.pixel_aspect_for(camera),
@@ -141,6 +159,16 @@ class StageReader:
             assets=read_assets(self._stage, _paths(drawables)) if self._extras.assets else {},
             rendering_space=self._settings.rendering_space,
         )
+
+    @cached_property
+    def _may_change(self) -> bool:
+        return facts.may_change(self._stage)
+
+    def _shared_lights(self, lights: Iterable[Light]) -> list[Light]:
+        """Lights that are as they were when last read are the same objects."""
+        found = [shared(light, self._lights.get(light.path)) for light in lights]
+        self._lights = {light.path: light for light in found}
+        return found
 
     def _read_camera(
         self, time: Usd.TimeCode, drawn: Iterable[PlacedSurface]
