@@ -270,7 +270,7 @@ def _has_cutout(scene: Scene) -> bool:
         return True
     varying = [m.display_opacity for m in scene.meshes if m.display_opacity is not None]
     constant = [d.display_opacity for d in scene.drawables]
-    return any(m.uses_display_color for m in scene.materials) and any((o < 1.0).any() for o in varying + constant)
+    return any(m.uses_display_opacity for m in scene.materials) and any((o < 1.0).any() for o in varying + constant)
 
 
 def _tight_clip(camera: Camera, bounds: NDArray[np.float64]) -> tuple[float, float]:

@@ -27,7 +27,7 @@ from defshade_cli.usd.nurbs import PATCH_ATTRIBUTES, read_patch
 from defshade_cli.usd.points import POINTS_ATTRIBUTES, read_points
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.positions import is_carried_by_velocities, read_positions
-from defshade_cli.usd.primvars import find_display, find_uvs
+from defshade_cli.usd.primvars import DISPLAY_COLOR, find_display, find_uvs
 from defshade_cli.usd.refiner import Refiner
 from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.subsets import FaceGroup, Faces, material_subsets, read_faces
@@ -85,14 +85,15 @@ class Gprim:
     cut: Cut
 
 
-def read_surface(prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
+def read_surface(prim: Usd.Prim, time: Usd.TimeCode, color: str = DISPLAY_COLOR) -> Surface | None:
     """The surface of `prim`; None for a type that is no supported surface. Bad data becomes issues, never raises.
 
     A surface of which nothing can be drawn has no groups, and issues that say why.
+    color: primvar to take for displayColor.
     """
     issues: list[str] = []
     path = str(prim.GetPath())
-    polygons, copies = _read_shape(prim, time, issues)
+    polygons, copies = _read_shape(prim, time, issues, color)
     if polygons is None:
         return None
     control = read_control(UsdGeom.Mesh(prim), polygons, time, issues) if prim.IsA(UsdGeom.Mesh) else None
@@ -132,21 +133,21 @@ def move_surface(surface: Surface, prim: Usd.Prim, time: Usd.TimeCode) -> Surfac
     return replace(surface, polygons=replace(polygons, points=points))
 
 
-def only_points_vary(prim: Usd.Prim) -> bool:
+def only_points_vary(prim: Usd.Prim, color: str = DISPLAY_COLOR) -> bool:
     """Is a mesh, if anything of it varies, the same but for its points?"""
-    return prim.IsA(UsdGeom.Mesh) and varying_names(prim) <= {"points", "velocities", "accelerations"}
+    return prim.IsA(UsdGeom.Mesh) and varying_names(prim, color) <= {"points", "velocities", "accelerations"}
 
 
-def is_time_varying(prim: Usd.Prim) -> bool:
-    return bool(varying_names(prim))
+def is_time_varying(prim: Usd.Prim, color: str = DISPLAY_COLOR) -> bool:
+    return bool(varying_names(prim, color))
 
 
-def varying_names(prim: Usd.Prim) -> set[str]:
+def varying_names(prim: Usd.Prim, color: str = DISPLAY_COLOR) -> set[str]:
     """Of what read_surface reads, primvars inherited and face subsets included, what may differ over time."""
     primvars = (
         UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals"),
         UsdGeom.PrimvarsAPI(prim).GetPrimvar("widths"),
-        find_display(prim, "displayColor"),
+        find_display(prim, color),
         find_display(prim, "displayOpacity"),
         *find_uvs(prim),
     )
@@ -157,16 +158,18 @@ def varying_names(prim: Usd.Prim) -> set[str]:
     return names | {"velocities"} if carried else names
 
 
-def _read_shape(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> tuple[Polygons | None, Copies | None]:
+def _read_shape(
+    prim: Usd.Prim, time: Usd.TimeCode, issues: list[str], color: str
+) -> tuple[Polygons | None, Copies | None]:
     if prim.IsA(UsdGeom.Mesh):
-        return read_mesh(UsdGeom.Mesh(prim), time, issues), None
+        return read_mesh(UsdGeom.Mesh(prim), time, issues, color), None
     if prim.IsA(UsdGeom.Points):
-        return read_points(UsdGeom.Points(prim), time, issues)
+        return read_points(UsdGeom.Points(prim), time, issues, color)
     if prim.IsA(UsdGeom.BasisCurves):
-        return read_curves(UsdGeom.BasisCurves(prim), time, issues), None
+        return read_curves(UsdGeom.BasisCurves(prim), time, issues, color), None
     if prim.IsA(UsdGeom.NurbsPatch):
-        return read_patch(UsdGeom.NurbsPatch(prim), time, issues), None
-    return read_solid(prim, time, issues), None
+        return read_patch(UsdGeom.NurbsPatch(prim), time, issues, color), None
+    return read_solid(prim, time, issues, color), None
 
 
 def _attributes(prim: Usd.Prim) -> tuple[str, ...]:

@@ -13,6 +13,8 @@ from pxr import Sdf, Usd, UsdGeom
 from defshade_cli.usd.polygons import Interpolation, Primvar
 from defshade_cli.usd.values import floats, integers
 
+DISPLAY_COLOR = "displayColor"
+
 Elements = Mapping[str, int]
 """How many values each interpolation needs."""
 
@@ -43,7 +45,7 @@ def authored(primvar: UsdGeom.Primvar, time: Usd.TimeCode) -> Authored | None:
 
 
 def find_display(prim: Usd.Prim, name: str) -> UsdGeom.Primvar:
-    """displayColor or displayOpacity: the prim's own, or an ancestor's where that is constant."""
+    """displayColor, displayOpacity or what is read in their place: the prim's own, or an ancestor's constant."""
     return UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
 
 
@@ -62,7 +64,7 @@ def read_uvs(prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: lis
 def read_display(
     prim: Usd.Prim, name: str, width: int, time: Usd.TimeCode, elements: Elements, issues: list[str]
 ) -> Primvar | None:
-    """displayColor or displayOpacity, all finite; None where there is none or it does not fit."""
+    """displayColor, displayOpacity or what is read in their place, all finite; None where there is none that fits."""
     return _fit_finite(authored(find_display(prim, name), time), width, elements, issues)
 
 

@@ -16,7 +16,6 @@ from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
 from defshade_cli.scene.light import Light
-from defshade_cli.scene.material import UNBOUND
 from defshade_cli.scene.motion import Moment, moment_of
 from defshade_cli.scene.scene import Scene, Unsupported
 from defshade_cli.settings import Complexity
@@ -217,15 +216,15 @@ def _drawables(
             glow, lights = glowing[piece]
             materials = [shown_material(material, glow, lights[0]) for material in materials]
         numbered = zip(gprim.groups, map(palette.number_of, materials), strict=True)
-        subsets = (Subset(number, group.first, group.count) for group, number in numbered)
+        subsets = tuple(Subset(number, group.first, group.count) for group, number in numbered)
         yield Drawable(
             mesh=meshes.setdefault(gprim.mesh, len(meshes)),
             world_from_object=piece.root_from_object,
-            subsets=tuple(subsets),
+            subsets=subsets,
             paths=piece.paths,
             instance_ids=piece.ids,
-            display_color=np.nan_to_num(piece.display_color, nan=UNBOUND.diffuse_color[0]),
-            display_opacity=np.nan_to_num(piece.display_opacity, nan=UNBOUND.opacity),
+            display_color=np.where(np.isnan(piece.display_color), materials[0].diffuse_color, piece.display_color),
+            display_opacity=np.nan_to_num(piece.display_opacity, nan=materials[0].opacity),
         )
 
 
