@@ -9,7 +9,7 @@ import pytest
 
 from defshade_cli.errors import OutputError, StageError
 from defshade_cli.image.reading import read
-from defshade_cli.render import Renderer, run, story
+from defshade_cli.rendering import Renderer, run, story
 from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
 
 STAGE = '#usda 1.0\ndef Sphere "ball" {}\ndef DistantLight "sun" {}\n'

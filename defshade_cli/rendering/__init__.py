@@ -4,8 +4,8 @@ story      the frames of a job, one after another        results   what became o
 renderer   the graphics devices that they are drawn on
 """
 
-from defshade_cli.render.renderer import Renderer
-from defshade_cli.render.results import FrameResult, ImageResult
-from defshade_cli.render.story import examine, render, run
+from defshade_cli.rendering.renderer import Renderer
+from defshade_cli.rendering.results import FrameResult, ImageResult
+from defshade_cli.rendering.story import examine, render, run
 
 __all__ = ["FrameResult", "ImageResult", "Renderer", "examine", "render", "run"]

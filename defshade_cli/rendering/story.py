@@ -19,8 +19,8 @@ from defshade_cli.image.files import write
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import BEAUTY
 from defshade_cli.plan import Plan, make_plan, plan_moments
-from defshade_cli.render.renderer import Renderer
-from defshade_cli.render.results import FrameResult, ImageResult
+from defshade_cli.rendering.renderer import Renderer
+from defshade_cli.rendering.results import FrameResult, ImageResult
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Composition, RenderJob, RenderSettings
 
