@@ -91,10 +91,11 @@ class Pipeline:
 
     def _resident(self, scene: Scene, plan: Plan) -> DrawList:
         """The scene on the GPU, with what the plan's planes read of it."""
-        if "MOTION" not in plan.inputs:
-            return self._scene.update(scene, plan.inputs)
-        self._motions.write(motion_records(scene, plan))
-        return self._scene.update(scene, plan.inputs, tuple(neighbouring_points(scene)))
+        moved: tuple[NDArray[np.float32], ...] = ()
+        if "MOTION" in plan.inputs:
+            self._motions.write(motion_records(scene, plan))
+            moved = tuple(neighbouring_points(scene))
+        return self._scene.update(scene, plan.inputs, moved, plan.primvars)
 
     def planes(self, scene: Scene, plan: Plan) -> Planes:
         """The float GBuffer at the pixels' centres: what the float64 reference is evaluated on."""

@@ -23,7 +23,7 @@ from defshade_cli.usd import stage as facts
 from defshade_cli.usd.camera import choose_camera, find_cameras, framed_camera, read_camera
 from defshade_cli.usd.complexity import View, choose_levels
 from defshade_cli.usd.geometry import Gprim, Surface
-from defshade_cli.usd.identity import read_assets
+from defshade_cli.usd.identity import read_assets, read_labels
 from defshade_cli.usd.instancing import Piece
 from defshade_cli.usd.light import camera_light
 from defshade_cli.usd.linking import link
@@ -155,6 +155,7 @@ class StageReader:
             pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
             data_window=self._settings.data_window,
+            labels=read_labels(self._stage, _paths(drawables), time) if self._extras.labels else {},
             assets=read_assets(self._stage, _paths(drawables)) if self._extras.assets else {},
             rendering_space=self._settings.rendering_space,
         )
