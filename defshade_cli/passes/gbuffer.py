@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import moderngl
-import numpy as np
-from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import Plane, integer_attachments, uses_standard_depth, write_source
@@ -18,10 +14,8 @@ from defshade_cli.gpu.targets import Target, allocate
 from defshade_cli.gpu.textures import textures_source
 from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.screen import TileMask
+from defshade_cli.scene.camera import Camera
 from defshade_cli.settings import Layout
-
-_CLIP_DISTANCE = 0x3000
-"""GL_CLIP_DISTANCE0: moderngl has no name for it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,12 +42,16 @@ def make_gbuffer(gpu: Gpu, size: tuple[int, int], planes: tuple[Plane, ...], lay
     return GBuffer(allocate(gpu, size, formats, gpu.depth_texture(size)), planes, layout)
 
 
+_CLIP_DISTANCE0 = 0x3000
+"""GL_CLIP_DISTANCE0, which moderngl has no name for."""
+
+
 @dataclass(frozen=True, slots=True)
 class GBufferVariant:
     """What the pass is compiled for.
 
     cutout: some opacity is below 1; color_varies: displayColor a vertex; texture_groups: 0 without textures.
-    clipping_planes: how many cut the geometry.
+    clipping_planes: how many the camera has.
     """
 
     planes: tuple[Plane, ...]
@@ -82,17 +80,15 @@ class GBufferPass:
             "generated/textures.glsl": textures_source(variant.texture_groups),
         }
         self._gpu, self._context = gpu, gpu.context
+        self._clip_distances = range(_CLIP_DISTANCE0, _CLIP_DISTANCE0 + variant.clipping_planes)
         self._program = gpu.shaders.program(
             "gbuffer.vert", "gbuffer.frag", defines=variant.defines, generated=generated
         )
 
-    def draw(
-        self, draws: DrawList, gbuffer: GBuffer, mask: TileMask, planes: NDArray[np.float64], *, whole: bool = False
-    ) -> None:
-        """All of `draws` with the bound View, one multi-draw; both sides of every face.
+    def draw(self, draws: DrawList, gbuffer: GBuffer, mask: TileMask, camera: Camera, *, whole: bool = False) -> None:
+        """All of `draws` with the bound View, that of `camera`, one multi-draw; both sides of every face.
 
         Under the mask the depth is the background's afterwards, and the planes are undefined unless `whole`.
-        planes: (N, 4) that clip, over relative positions, as many as the variant has.
         """
         standard = uses_standard_depth(gbuffer.layout)
         nearest, background = (0.0, 1.0) if standard else (1.0, 0.0)
@@ -107,19 +103,19 @@ class GBufferPass:
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = "<" if standard else ">"
         draws.textures.bind(self._program)
+        self._clip(camera)
         vertex_array = self._context.vertex_array(self._program, draws.vertices_of(self._program), draws.indices)
-        with self._clipped(planes):
-            vertex_array.render_indirect(draws.commands)
+        vertex_array.render_indirect(draws.commands)
         vertex_array.release()
+        for distance in self._clip_distances:
+            self._context.disable_direct(distance)
         mask.fill(gbuffer.target, background)
 
-    @contextmanager
-    def _clipped(self, planes: NDArray[np.float64]) -> Iterator[None]:
-        """Only what lies on the inner side of every plane is drawn."""
-        if values := [tuple(plane) for plane in planes.tolist()]:
-            self._program["clipping_planes"] = values if len(values) > 1 else values[0]
-        for number in range(len(planes)):
-            self._context.enable_direct(_CLIP_DISTANCE + number)
-        yield
-        for number in range(len(planes)):
-            self._context.disable_direct(_CLIP_DISTANCE + number)
+    def _clip(self, camera: Camera) -> None:
+        """By the camera's clipping planes, in relative space. Shadows are cast by what they cut off, as in Storm."""
+        for distance in self._clip_distances:
+            self._context.enable_direct(distance)
+        if self._clip_distances:
+            planes = camera.clipping_planes.copy()
+            planes[:, :3] @= camera.world_from_camera[:3, :3].T
+            self._program["clipping_planes"] = [tuple(plane) for plane in planes.tolist()]

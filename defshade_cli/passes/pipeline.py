@@ -28,7 +28,7 @@ from defshade_cli.passes.screen import Screen, TileMask
 from defshade_cli.passes.shadows import ShadowAtlas, ShadowPass
 from defshade_cli.passes.stopping import Stopping
 from defshade_cli.passes.tables import LightTables, TableStore
-from defshade_cli.passes.view import relative_clipping_planes, view_record
+from defshade_cli.passes.view import view_record
 from defshade_cli.plan import Plan, ShutterSample
 from defshade_cli.scene.scene import Scene
 
@@ -91,10 +91,11 @@ class Pipeline:
 
     def _resident(self, scene: Scene, plan: Plan) -> DrawList:
         """The scene on the GPU, with what the plan's planes read of it."""
-        if "MOTION" not in plan.inputs:
-            return self._scene.update(scene, plan.inputs)
-        self._motions.write(motion_records(scene, plan))
-        return self._scene.update(scene, plan.inputs, tuple(neighbouring_points(scene)))
+        moved: tuple[NDArray[np.float32], ...] = ()
+        if "MOTION" in plan.inputs:
+            self._motions.write(motion_records(scene, plan))
+            moved = tuple(neighbouring_points(scene))
+        return self._scene.update(scene, plan.inputs, moved, plan.primvars)
 
     def planes(self, scene: Scene, plan: Plan) -> Planes:
         """The float GBuffer at the pixels' centres: what the float64 reference is evaluated on."""
@@ -179,7 +180,13 @@ class Pipeline:
 
     def _draw_gbuffer(self, draws: DrawList, plan: Plan, gbuffer: GBuffer, sample: Sample) -> None:
         self._view.write(view_record(plan, gbuffer.layout, sample))
-        clipping = relative_clipping_planes(plan.camera)
-        flags = plan.cutout, draws.color_varies, draws.texture_groups, plan.render_space, len(clipping)
-        gbuffer_pass = self._gbuffer_pass(GBufferVariant(gbuffer.planes, gbuffer.layout, *flags))
-        gbuffer_pass.draw(draws, gbuffer, self._mask, clipping, whole=bool(plan.mattes))
+        variant = GBufferVariant(
+            gbuffer.planes,
+            gbuffer.layout,
+            plan.cutout,
+            draws.color_varies,
+            draws.texture_groups,
+            plan.render_space,
+            len(plan.camera.clipping_planes),
+        )
+        self._gbuffer_pass(variant).draw(draws, gbuffer, self._mask, plan.camera, whole=bool(plan.mattes))

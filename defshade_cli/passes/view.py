@@ -35,12 +35,6 @@ def view_record(plan: Plan, layout: Layout, sample: Sample = CENTRE) -> NDArray:
     return view
 
 
-def relative_clipping_planes(camera: Camera) -> NDArray[np.float64]:
-    """(N, 4) the camera's clipping planes over relative positions."""
-    planes = camera.clipping_planes
-    return np.column_stack([planes[:, :3] @ camera.world_from_camera[:3, :3].T, planes[:, 3]])
-
-
 def lens_offset(camera: Camera, u: tuple[float, float]) -> NDArray[np.float64]:
     """(3,) place on the thin lens in camera space, scene units: a disk of diameter focal length / f-stop.
 

@@ -17,9 +17,6 @@ Projection = Literal["perspective", "orthographic"]
 
 DEFAULT_SIZE = (1920, 1080)
 
-MOST_CLIPPING_PLANES = 8
-"""What every OpenGL 4 driver can do: GL_MAX_CLIP_DISTANCES."""
-
 
 def image_size(
     aspect: float,
@@ -51,7 +48,7 @@ class Camera:
     exposure: linear scale of the camera's exposure attributes (UsdGeomCamera.ComputeLinearExposureScale).
     f_stop, focus_distance, focal_length: lens; f_stop 0 is a pinhole.
     shutter: (open, close) in time codes around the frame.
-    clipping_planes: (N, 4) float64; of (x, y, z) in camera space what has a x + b y + c z + d < 0 is cut off.
+    clipping_planes: (N, 4) float64 in camera space: a point p is seen where no plane · (p, 1) is negative.
     """
 
     path: str

@@ -27,7 +27,14 @@ from defshade_cli.usd.nurbs import PATCH_ATTRIBUTES, read_patch
 from defshade_cli.usd.points import POINTS_ATTRIBUTES, read_points
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.positions import is_carried_by_velocities, read_positions
-from defshade_cli.usd.primvars import DISPLAY_COLOR, find_display, find_uvs
+from defshade_cli.usd.primvars import (
+    DISPLAY_COLOR,
+    Elements,
+    count_elements,
+    find_display,
+    find_uvs,
+    read_shown,
+)
 from defshade_cli.usd.refiner import Refiner
 from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.subsets import FaceGroup, Faces, material_subsets, read_faces
@@ -86,18 +93,25 @@ class Gprim:
 
 
 def read_surface(
-    prim: Usd.Prim, time: Usd.TimeCode, color: str = DISPLAY_COLOR, *, as_cages: bool = False
+    prim: Usd.Prim,
+    time: Usd.TimeCode,
+    color: str = DISPLAY_COLOR,
+    shown: tuple[str, ...] = (),
+    *,
+    as_cages: bool = False,
 ) -> Surface | None:
     """The surface of `prim`; None for a type that is no supported surface. Bad data becomes issues, never raises.
 
     A surface of which nothing can be drawn has no groups, and issues that say why.
-    color: primvar to take for displayColor.  as_cages: see gprims.read_solid.
+    color: primvar to take for displayColor.  shown: primvars for layers.  as_cages: see gprims.read_solid.
     """
     issues: list[str] = []
     path = str(prim.GetPath())
     polygons, copies = _read_shape(prim, time, issues, color, as_cages)
     if polygons is None:
         return None
+    if shown:
+        polygons = replace(polygons, shown=read_shown(prim, shown, time, _elements(polygons), issues))
     is_mesh = prim.IsA(UsdGeom.Mesh)
     control = read_control(UsdGeom.Mesh(prim), polygons, time, issues) if is_mesh else smooth_control(polygons)
     faces = read_faces(prim, time, issues)
@@ -114,6 +128,12 @@ def read_surface(
         display_opacity=None if opacity is None else float(opacity),
         issues=tuple(Unsupported(path, issue) for issue in issues),
     )
+
+
+def _elements(polygons: Polygons) -> Elements:
+    """Of polygons as they were read; values of faces and corners fit none from which broken faces were left out."""
+    whole = np.array_equal(polygons.faces, np.arange(len(polygons.counts)))
+    return count_elements(whole * len(polygons.counts), len(polygons.points), whole * len(polygons.indices))
 
 
 def tessellate(surface: Surface, refiner: Refiner | None = None, last: Gprim | None = None) -> Gprim:
@@ -136,16 +156,16 @@ def move_surface(surface: Surface, prim: Usd.Prim, time: Usd.TimeCode) -> Surfac
     return replace(surface, polygons=replace(polygons, points=points))
 
 
-def only_points_vary(prim: Usd.Prim, color: str = DISPLAY_COLOR) -> bool:
+def only_points_vary(prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = ()) -> bool:
     """Is a mesh, if anything of it varies, the same but for its points?"""
-    return prim.IsA(UsdGeom.Mesh) and varying_names(prim, color) <= {"points", "velocities", "accelerations"}
+    return prim.IsA(UsdGeom.Mesh) and varying_names(prim, color, shown) <= {"points", "velocities", "accelerations"}
 
 
-def is_time_varying(prim: Usd.Prim, color: str = DISPLAY_COLOR) -> bool:
-    return bool(varying_names(prim, color))
+def is_time_varying(prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = ()) -> bool:
+    return bool(varying_names(prim, color, shown))
 
 
-def varying_names(prim: Usd.Prim, color: str = DISPLAY_COLOR) -> set[str]:
+def varying_names(prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = ()) -> set[str]:
     """Of what read_surface reads, primvars inherited and face subsets included, what may differ over time."""
     primvars = (
         UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals"),
@@ -153,6 +173,7 @@ def varying_names(prim: Usd.Prim, color: str = DISPLAY_COLOR) -> set[str]:
         find_display(prim, color),
         find_display(prim, "displayOpacity"),
         *find_uvs(prim),
+        *(UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name) for name in shown),
     )
     subsets = (subset.GetIndicesAttr() for subset in material_subsets(prim))
     sources = (*(prim.GetAttribute(name) for name in _attributes(prim)), *primvars, *subsets)

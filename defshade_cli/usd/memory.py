@@ -50,12 +50,13 @@ class Memory:
 
     def _at_another_time(self, known: Surface, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
         """Read is no more than varies; what turns out to be equal stays the same object."""
-        color = self._color_primvar(prim, time)
-        moved = move_surface(known, prim, time) if known.groups and only_points_vary(prim, color) else None
+        shown = self._color_primvar(prim, time), self._extras.primvars
+        moved = move_surface(known, prim, time) if known.groups and only_points_vary(prim, *shown) else None
         return shared(moved or self._read_surface(prim, time), known)
 
     def _read_surface(self, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
-        surface = read_surface(prim, time, self._color_primvar(prim, time), as_cages=self._as_cages)
+        color = self._color_primvar(prim, time)
+        surface = read_surface(prim, time, color, self._extras.primvars, as_cages=self._as_cages)
         return None if surface is None else self._as_shown(surface, prim.GetPath())
 
     def stand_in(self, prim: Usd.Prim, mode: str) -> Surface:
@@ -103,7 +104,8 @@ class Memory:
         """Asked only when a second frame is read."""
         path = prim.GetPath()
         if path not in self._time_varying:
-            self._time_varying[path] = is_time_varying(prim, self._color_primvar(prim, Usd.TimeCode.Default()))
+            color = self._color_primvar(prim, Usd.TimeCode.Default())
+            self._time_varying[path] = is_time_varying(prim, color, self._extras.primvars)
         return self._time_varying[path]
 
     def _as_shown(self, surface: Surface, path: Sdf.Path) -> Surface:

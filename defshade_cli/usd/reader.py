@@ -25,7 +25,7 @@ from defshade_cli.usd.complexity import View, choose_levels
 from defshade_cli.usd.copies import rounded
 from defshade_cli.usd.extent import extent_of
 from defshade_cli.usd.geometry import Gprim, Surface
-from defshade_cli.usd.identity import read_assets
+from defshade_cli.usd.identity import read_assets, read_labels
 from defshade_cli.usd.instancing import Piece
 from defshade_cli.usd.light import camera_light
 from defshade_cli.usd.linking import link
@@ -160,6 +160,7 @@ class StageReader:
             pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
             data_window=self._settings.data_window,
+            labels=read_labels(self._stage, _paths(drawables), time) if self._extras.labels else {},
             assets=read_assets(self._stage, _paths(drawables)) if self._extras.assets else {},
             rendering_space=self._settings.rendering_space,
         )
