@@ -7,7 +7,6 @@ Surface ── refiner ── normals ── triangulation ── subsets ──
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TypeGuard
 
 import numpy as np
@@ -16,18 +15,19 @@ from pxr import Usd, UsdGeom
 
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.scene.scene import Unsupported
-from defshade_cli.usd import flatness
 from defshade_cli.usd.control import CONTROL_ATTRIBUTES, Control, read_control
 from defshade_cli.usd.copies import Copies
 from defshade_cli.usd.curves import CURVES_ATTRIBUTES, read_curves
+from defshade_cli.usd.flatness import flatness
 from defshade_cli.usd.gprims import read_solid, size_attributes
 from defshade_cli.usd.mesh import MESH_ATTRIBUTES, read_mesh
 from defshade_cli.usd.normals import with_normals
 from defshade_cli.usd.nurbs import PATCH_ATTRIBUTES, read_patch
 from defshade_cli.usd.points import POINTS_ATTRIBUTES, read_points
 from defshade_cli.usd.polygons import Polygons, Primvar
-from defshade_cli.usd.primvars import find_display, find_uvs
+from defshade_cli.usd.primvars import find_primvars, may_be_uvs
 from defshade_cli.usd.refiner import Refiner
+from defshade_cli.usd.shapes import Shapes
 from defshade_cli.usd.subsets import FaceGroup, Faces, material_subsets, read_faces
 from defshade_cli.usd.triangulation import triangulate
 
@@ -59,13 +59,13 @@ class Surface:
     display_opacity: float | None
     issues: tuple[Unsupported, ...]
 
-    @cached_property
+    @property
     def mean_edge(self) -> float:
-        return flatness.mean_edge(self.polygons)
+        return flatness(self.polygons).mean_edge
 
-    @cached_property
+    @property
     def rise(self) -> float:
-        return flatness.rise(self.polygons)
+        return flatness(self.polygons).rise
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,28 +82,31 @@ class Gprim:
     issues: tuple[Unsupported, ...]
 
 
-def read_surface(prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
+def read_surface(prim: Usd.Prim, time: Usd.TimeCode, shapes: Shapes | None = None) -> Surface | None:
     """The surface of `prim`; None for a type that is no supported surface. Bad data becomes issues, never raises.
 
     A surface of which nothing can be drawn has no groups, and issues that say why.
+    shapes: of other prims, whose polygons it shares where they are equal.
     """
     issues: list[str] = []
     path = str(prim.GetPath())
     polygons, copies = _read_shape(prim, time, issues)
     if polygons is None:
         return None
+    color, opacity = _constant(polygons.display_color), _constant(polygons.display_opacity)
+    if shapes is not None:
+        polygons = shapes.shared(polygons.without_constants())
     control = read_control(UsdGeom.Mesh(prim), polygons, time, issues) if prim.IsA(UsdGeom.Mesh) else None
     faces = read_faces(prim, time, issues)
-    opacity = _constant(polygons.display_opacity)
     return Surface(
         path=path,
         polygons=polygons,
         control=control,
         faces=faces,
         groups=faces.groups_of(polygons.without_holes().faces) if copies is None or len(copies.ids) else (),
-        double_sided=bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get()),
+        double_sided=prim.HasProperty("doubleSided") and bool(prim.GetAttribute("doubleSided").Get()),
         copies=copies,
-        display_color=_constant(polygons.display_color),
+        display_color=color,
         display_opacity=None if opacity is None else float(opacity),
         issues=tuple(Unsupported(path, issue) for issue in issues),
     )
@@ -125,13 +128,17 @@ def is_time_varying(prim: Usd.Prim) -> bool:
     primvars = (
         UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals"),
         UsdGeom.PrimvarsAPI(prim).GetPrimvar("widths"),
-        find_display(prim, "displayColor"),
-        find_display(prim, "displayOpacity"),
-        *find_uvs(prim),
+        *_carried(prim),
     )
     subsets = (subset.GetIndicesAttr() for subset in material_subsets(prim))
     sources = (*(prim.GetAttribute(name) for name in _attributes(prim)), *primvars, *subsets)
     return any(source.ValueMightBeTimeVarying() for source in sources if source)
+
+
+def _carried(prim: Usd.Prim) -> list[UsdGeom.Primvar]:
+    """The primvars that may be read of it, see primvars.read_carried."""
+    found = find_primvars(prim).items()
+    return [p for name, p in found if name in ("displayColor", "displayOpacity") or may_be_uvs(p)]
 
 
 def _read_shape(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> tuple[Polygons | None, Copies | None]:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import logging
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from pxr import Usd
 
 from defshade_cli.errors import EmptyStage
@@ -27,6 +29,7 @@ from defshade_cli.usd.light import camera_light
 from defshade_cli.usd.linking import link
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.palette import Palette
+from defshade_cli.usd.polygons import Polygons
 from defshade_cli.usd.settings import read_settings
 from defshade_cli.usd.tessellation import Tessellation
 from defshade_cli.usd.traversal import Traversal
@@ -125,7 +128,10 @@ class StageReader:
     ) -> tuple[Camera, tuple[Unsupported, ...]]:
         """The camera; one of ours frames the surfaces as authored, however they are refined."""
         if self._camera is None:
-            boxes = (world_boxes(surface.polygons.bounds, piece.root_from_object) for piece, surface in drawn)
+            placed: dict[Polygons, list[NDArray[np.float64]]] = defaultdict(list)
+            for piece, surface in drawn:
+                placed[surface.polygons].append(piece.root_from_object)
+            boxes = (world_boxes(polygons.bounds, _joined(matrices)) for polygons, matrices in placed.items())
             return framed_camera(enclose(boxes), facts.up_axis(self._stage)), ()
         camera, issues = read_camera(self._camera, time)
         return self._settings.applied_to(camera), issues
@@ -149,20 +155,35 @@ def _drawables(
     drawn: Iterable[PlacedSurface], gprims: Mapping[Surface, Gprim], meshes: dict[Mesh, int], palette: Palette
 ) -> Iterator[Drawable]:
     """What is drawn; `meshes` takes the meshes, each with its number."""
+    alike: dict[tuple[int, tuple[Subset, ...], bool | Piece], list[Piece]] = {}
     for piece, surface in drawn:
         gprim = gprims[surface]
         if not gprim.groups:
             continue
-        subsets = (Subset(palette.number(piece.bindings[g.path]), g.first, g.count) for g in gprim.groups)
-        yield Drawable(
-            mesh=meshes.setdefault(gprim.mesh, len(meshes)),
-            world_from_object=piece.root_from_object,
-            subsets=tuple(subsets),
-            paths=piece.paths,
-            instance_ids=piece.ids,
-            display_color=np.nan_to_num(piece.display_color, nan=UNBOUND.diffuse_color[0]),
-            display_opacity=np.nan_to_num(piece.display_opacity, nan=UNBOUND.opacity),
-        )
+        subsets = tuple(Subset(palette.number(piece.bindings[g.path]), g.first, g.count) for g in gprim.groups)
+        named = len(piece.paths) == len(piece.ids)
+        mesh = meshes.setdefault(gprim.mesh, len(meshes))
+        alike.setdefault((mesh, subsets, named or piece), []).append(piece)
+    for (mesh, subsets, _), pieces in alike.items():
+        yield _drawable(mesh, subsets, pieces)
+
+
+def _drawable(mesh: int, subsets: tuple[Subset, ...], pieces: Sequence[Piece]) -> Drawable:
+    """Pieces of the same looks as instances of one mesh."""
+    color, opacity = _joined([p.display_color for p in pieces]), _joined([p.display_opacity for p in pieces])
+    return Drawable(
+        mesh=mesh,
+        world_from_object=_joined([piece.root_from_object for piece in pieces]),
+        subsets=subsets,
+        paths=tuple(path for piece in pieces for path in piece.paths),
+        instance_ids=_joined([piece.ids for piece in pieces]),
+        display_color=np.nan_to_num(color, nan=UNBOUND.diffuse_color[0]),
+        display_opacity=np.nan_to_num(opacity, nan=UNBOUND.opacity),
+    )
+
+
+def _joined(arrays: Sequence[NDArray]) -> NDArray:
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
 def _paths(drawables: Iterable[Drawable]) -> dict[str, None]:
