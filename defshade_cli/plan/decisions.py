@@ -33,6 +33,8 @@ def explain(plan: Plan) -> Iterator[Decision]:
     for volume in ("quad", "sphere", "cone"):
         count = sum(planned.volume == volume for planned in plan.lights)
         yield Decision(f"{volume} volumes", f"{count} drawn" if count else "skipped", "lights that reach geometry")
+    parts = bool(plan.outputs or plan.groups)
+    yield _kept("light in parts", parts, "layers show lobes, groups or shadows", "no layer shows a part of the light")
     yield _kept("shadow maps", plan.shadows, "a light casts them", "no light casts any, or none were asked")
     yield _kept("IES profiles", bool(plan.profiles), "a light is shaped by one", "no light has one")
     yield _kept("shadow linking", plan.shadow_linked, "a light chooses its casters", "everything casts shadows")

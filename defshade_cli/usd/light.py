@@ -41,6 +41,14 @@ _CLASSES: tuple[tuple[Any, type[Light], tuple[str, ...]], ...] = (
 )
 """Schema, scene class, and the inputs that say its size."""
 
+_GROUP_ATTRIBUTES = (
+    "inputs:lightGroup",
+    "inputs:ri:light:lightGroup",
+    "primvars:arnold:aov",
+    "primvars:karma:light:lpetag",
+)
+"""A light's group: ours, since UsdLux has none, then RenderMan's, Arnold's and Karma's."""
+
 _WHITE = np.array(UsdLux.BlackbodyTemperatureAsRgb(6500.0))
 
 
@@ -96,7 +104,13 @@ def _common(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any]:
     casts_shadow = _input(prim, "shadow:enable", time) if prim.HasAPI(UsdLux.ShadowAPI) else True
     values = {name: _input(prim, name, time) for name in ("intensity", "exposure", "normalize", "diffuse", "specular")}
     shaping = _shaping(prim, time) if prim.HasAPI(UsdLux.ShapingAPI) else None
-    return {"color": color, "shaping": shaping, "casts_shadow": casts_shadow} | values
+    return {"color": color, "shaping": shaping, "casts_shadow": casts_shadow, "group": _group(prim)} | values
+
+
+def _group(prim: Usd.Prim) -> str:
+    """The light group, in the first of the ways to say it; empty without one."""
+    values = (attribute.Get() for name in _GROUP_ATTRIBUTES if (attribute := prim.GetAttribute(name)))
+    return next((str(value) for value in values if value), "")
 
 
 def _shaping(prim: Usd.Prim, time: Usd.TimeCode) -> Shaping:
