@@ -2,8 +2,8 @@
 
     python benchmarks/reading.py [STAGE...]
 
-Without arguments, stages are generated in memory. Each is opened and read ROUNDS times; the least processor time counts,
-since other work on the machine only adds.
+Without arguments, stages are generated in memory. Each is read ROUNDS times; the least processor time counts, since
+other work on the machine only adds.
 """
 
 from __future__ import annotations

@@ -139,6 +139,7 @@ PLANES: tuple[Plane, ...] = (
     _detail("tangent", 4, "vec4(d.tangent, 0.0)", "POSITION", "LAYER_UV"),
     _detail("uv", 2, "vec4(d.uv, 0.0, 0.0)", "LAYER_UV"),
     _detail("occlusion", 1, "vec4(d.occlusion)"),
+    _detail("motion", 4, "d.motion", "MOTION"),
     _detail("visible", 2, "uvec4(d.visible, 0u, 0u)", "DRAW_ROW", dtype="u4"),
 )
 

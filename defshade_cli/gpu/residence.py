@@ -19,7 +19,7 @@ from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 
-VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS, TEXTURE_INPUTS, TILES, LINKS = range(8)
+VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS, TEXTURE_INPUTS, TILES, LINKS, MOTIONS = range(9)
 """Binding points of the storage buffers, as the shaders declare them."""
 
 INDICES_IN_POOL = 2
@@ -90,11 +90,13 @@ class GpuScene:
         self._made_for: tuple = ()
         self._pool: list[moderngl.Buffer] = []
         self._draws: list[moderngl.Buffer] = []
+        self._moved: list[moderngl.Buffer] = []
 
-    def update(self, scene: Scene, inputs: Collection[str] = ()) -> DrawList:
+    def update(self, scene: Scene, inputs: Collection[str] = (), moved: Sequence[NDArray[np.float32]] = ()) -> DrawList:
         """Make the scene's geometry, placements and materials resident, relative to its camera.
 
         inputs: what layers read of the vertices, as gpu.planes.Plane.inputs names it.
+        moved: (V, 3) points of all meshes a frame before and after, where MOTION is among them.
         """
         layer_uv = "LAYER_UV" in inputs
         self._instances.write(instance_records(scene.drawables, scene.camera.position))
@@ -117,6 +119,9 @@ class GpuScene:
         names = [("4f", "vertex_color")] * color_varies + [("4f", "vertex_uv")] * textured
         names += [("2f", "vertex_layer_uv")] * layer_uv
         vertices += [(buffer, *name) for buffer, name in zip(varying, names, strict=True)]
+        self._moved = self._replaced(self._moved, moved)
+        moments = ("position_before", "position_after")[: len(moved)]
+        vertices += [(buffer, "3f", name) for buffer, name in zip(self._moved, moments, strict=True)]
         vertices.append((self._draws[1], "2u4/i", "draw"))
         vertices += [(buffer, "1u4/i", "draw_row") for buffer in self._draws[2:]]
         corners = command_corners(scene)

@@ -16,6 +16,7 @@ from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.emission import Emitter, emitter_at, far_field, sky_emitter
 from defshade_cli.scene.light import DomeLight
+from defshade_cli.scene.mesh_light import MeshLight
 from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import Window
 
@@ -90,7 +91,8 @@ def _corners(box: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _lit_sample(planned: PlannedLight, emitter: Emitter, plan: Plan, extent: ShadowExtent) -> LitSample:
     light = planned.light
-    if not (plan.shadows and light.casts_shadow):
+    within_itself = isinstance(light, MeshLight) and plan.samples == 1  # its far field shines from amid its own surface
+    if not (plan.shadows and light.casts_shadow) or within_itself:
         return LitSample(planned, emitter, ())
     relative = emitter.relative_to(plan.camera.position)
     cameras = shadow_cameras(relative, light.shaping, extent, distant=light.is_infinite)

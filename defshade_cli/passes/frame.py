@@ -20,7 +20,7 @@ class Frame:
         self._gpu = gpu
         self._size: Size = (0, 0)
         self._gbuffers: dict[tuple[tuple[Plane, ...], Layout], GBuffer] = {}
-        self._radiance: dict[str, Target] = {}
+        self._radiance: dict[tuple[str, GBuffer | None], Target] = {}
         self._lights: tuple[tuple, LightTargets | None] = (), None
 
     def gbuffer(self, size: Size, planes: tuple[Plane, ...], layout: Layout) -> GBuffer:
@@ -30,13 +30,13 @@ class Frame:
             self._gbuffers[planes, layout] = make_gbuffer(self._gpu, size, planes, layout)
         return self._gbuffers[planes, layout]
 
-    def radiance(self, name: str, size: Size, gbuffer: GBuffer | None = None) -> Target:
-        """A float RGBA target with one texture "radiance"; it tests against the depth of `gbuffer` where given."""
+    def radiance(self, name: str, size: Size, gbuffer: GBuffer | None = None, components: int = 4) -> Target:
+        """A float target with one texture "radiance"; it tests against the depth of `gbuffer` where given."""
         self._resize(size)
-        key = name if gbuffer is None else f"{name} {gbuffer.layout} {len(gbuffer.planes)}"
+        key = name, gbuffer
         if key not in self._radiance:
             depth = gbuffer.target.depth if gbuffer else None
-            self._radiance[key] = allocate(self._gpu, size, {"radiance": (4, "f4")}, depth)
+            self._radiance[key] = allocate(self._gpu, size, {"radiance": (components, "f4")}, depth)
         return self._radiance[key]
 
     def light_targets(self, radiance: Target, plan: Plan) -> LightTargets:

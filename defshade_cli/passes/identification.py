@@ -59,13 +59,13 @@ class Mattes:
         for layer, coverage in self._coverage.items():
             coverage.add(self._tables[layer][visible[..., 0].ravel()])
 
-    def layers(self) -> dict[str, NDArray[np.float32]]:
-        """(H, W, 2 · ranks) each."""
+    def layers(self, samples: int) -> dict[str, NDArray[np.float32]]:
+        """(H, W, 2 · ranks) each, of so many samples."""
         width, height = self._plan.size
         return {
-            layer: coverage.ranked(
-                name_ids(self._names[layer]), self._plan.ranks, self._plan.samples, width * height
-            ).reshape(height, width, -1)
+            layer: coverage.ranked(name_ids(self._names[layer]), self._plan.ranks, samples, width * height).reshape(
+                height, width, -1
+            )
             for layer, coverage in self._coverage.items()
         }
 

@@ -39,11 +39,14 @@ def explain(plan: Plan) -> Iterator[Decision]:
     yield _kept("IES profiles", bool(plan.profiles), "a light is shaped by one", "no light has one")
     yield _kept("shadow linking", plan.shadow_linked, "a light chooses its casters", "everything casts shadows")
     yield _kept("environment", bool(plan.domes), "a dome lights the scene", "no dome")
+    if plan.portals:
+        yield Decision("portals", "passed over", "hints: domes are sampled by their radiance")
     yield _kept("cutout", plan.cutout, "some opacity is or may be below 1", "no opacity is below 1")
     yield _kept("textures", plan.textures, "a material reads them", "no material reads any")
     if plan.data_layers:
         jittered, shared = "the beauty's is jittered, quantised or dithered", "the beauty's own float sample serves"
         yield _kept("data GBuffer", plan.data_pass, jittered if plan.sampled else "as asked", shared)
+    yield _kept("error estimate", plan.tracks_error, "as asked", "nothing needs it")
     if not plan.lit:
         yield Decision("lighting", "skipped", "no layer needs it")
 

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.planes import MOST_TARGETS, Plane, named_planes, needed_planes
-from defshade_cli.image.layers import LAYERS, resolve
-from defshade_cli.image.render_space import RenderSpace, find_render_space
+from defshade_cli.image.layers import BEAUTY, LAYERS, resolve
+from defshade_cli.image.ocio import find_render_space
+from defshade_cli.image.render_space import RenderSpace
 from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.groups import light_groups, light_outputs
 from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
@@ -18,6 +19,7 @@ from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
+from defshade_cli.scene.shadow import PLAIN
 from defshade_cli.scene.window import DataWindow, from_ndc
 from defshade_cli.settings import FILTERS, Complexity, Filter, Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
@@ -35,13 +37,14 @@ class Plan:
     clip: (near, far), the camera's range tightened to the geometry.
     render_space: of light and reflectance.
     exposure: linear, the camera's and the settings' together.
-    filter_width: pixels.
+    samples: a pixel at most.  max_error, time_limit: of RenderSettings.  filter_width: pixels.
     planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
     lights: sorted quads, spheres, cones.
     shadows: some light casts them.  shadow_linked: in some light not all geometry does.
     background: domes are seen where no geometry is.
     cutout: some opacity may be below 1.  textures: some material reads them.
     data_pass: data layers need an unjittered float GBuffer of their own.
+    portals: how many hints for sampling domes the stage has.
     levels: how often subdivision surfaces were refined, ascending; empty without any.
     ranks: (id, coverage) pairs of a Cryptomatte.
     """
@@ -56,6 +59,8 @@ class Plan:
     layout: Layout
     shading: Shading
     samples: int
+    max_error: float | None
+    time_limit: float | None
     filter: Filter
     filter_width: float
     layers: tuple[str, ...]
@@ -69,6 +74,7 @@ class Plan:
     textures: bool
     data_pass: bool
     complexity: Complexity
+    portals: int
     levels: tuple[int, ...]
     ranks: int
 
@@ -81,6 +87,12 @@ class Plan:
     def lit(self) -> bool:
         """Does any layer need the lighting?"""
         return any(LAYERS[name].source == "lighting" for name in self.layers)
+
+    @property
+    def tracks_error(self) -> bool:
+        """Is the error of the mean asked for?"""
+        asked = self.max_error is not None or self.time_limit is not None or "variance" in self.layers
+        return self.sampled and self.samples > 1 and asked
 
     @property
     def sampled(self) -> bool:
@@ -122,6 +134,11 @@ class Plan:
         return tuple(planned for planned in self.lights if isinstance(planned.light, DomeLight))
 
     @property
+    def shadow_styles(self) -> bool:
+        """Are some shadows other than black, or do they end?"""
+        return self.shadows and any(p.light.casts_shadow and p.light.shadow != PLAIN for p in self.lights)
+
+    @property
     def profiles(self) -> tuple[IesProfile, ...]:
         """The IES profiles of the lights, each once."""
         shapings = [planned.light.shaping for planned in self.lights]
@@ -137,7 +154,7 @@ class Plan:
         """Names of the passes in the order of the pipeline."""
         before = ("gbuffer", "emission", *("environment",) * bool(self.domes), *("shadow maps",) * self.shadows)
         lighting = before + tuple(f"light {volume}" for volume in self.volumes)
-        accumulation = ("accumulation",) * (self.samples > 1)
+        accumulation = ("accumulation",) * (self.samples > 1) + ("batch means",) * self.tracks_error
         return (lighting + accumulation if self.sampled else ()) + ("data gbuffer",) * self.data_pass
 
     @property
@@ -148,7 +165,7 @@ class Plan:
 
 def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     """Decide. Raises UsageError for a layer or a render space that does not exist, or an image without pixels."""
-    layers = resolve(settings.layers)
+    layers = resolve(settings.layers or (BEAUTY,))
     display = image_size(scene.camera.aspect, settings.size, settings.width, scene.resolution)
     display_camera = scene.camera.conformed(display[0] * scene.pixel_aspect / display[1], scene.conform)
     window = DataWindow(*settings.crop) if settings.crop else from_ndc(scene.data_window, display)
@@ -168,7 +185,9 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         exposure=exposure,
         layout=settings.layout,
         shading=settings.shading,
-        samples=settings.samples,
+        samples=settings.most_samples,
+        max_error=settings.max_error,
+        time_limit=settings.time_limit,
         filter=settings.filter,
         filter_width=settings.filter_width or FILTERS[settings.filter],
         layers=layers,
@@ -183,6 +202,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         data_pass=data_pass,
         complexity=settings.complexity,
         ranks=settings.cryptomatte_levels,
+        portals=len(scene.portals),
         levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None})),
     )
 
@@ -208,7 +228,7 @@ def _divide_planes(
     data = named_planes(row.source for row in rows)
     both = named_planes(plane.name for plane in (*lit, *data))
     sampled, has_data = any(row.is_sampled for row in rows), not all(row.is_sampled for row in rows)
-    exact = settings.layout == "float" and settings.samples == 1 and not cutout and len(both) <= MOST_TARGETS
+    exact = settings.layout == "float" and settings.most_samples == 1 and not cutout and len(both) <= MOST_TARGETS
     data_pass = has_data and not (sampled and exact)
     return (lit if data_pass or not has_data else both), data, data_pass
 

@@ -10,10 +10,12 @@ class Extras:
     """Nothing of this changes the lit image.
 
     occlusion: of materials.  assets: which component each prim is part of.
+    motion: where things are a frame before and after.
     """
 
     occlusion: bool = False
     assets: bool = False
+    motion: bool = False
 
 
 NO_EXTRAS = Extras()

@@ -13,6 +13,7 @@ from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.geometry import Drawable, Mesh, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import Material
+from defshade_cli.scene.motion import Moment
 from defshade_cli.scene.texture import Texture
 from defshade_cli.scene.window import WHOLE_IMAGE
 from defshade_cli.spaces import ConformPolicy
@@ -31,7 +32,9 @@ class Scene:
     """A stage at one time code, in world space and scene units.
 
     camera: the one to render; cameras: the paths of all that the stage has.
+    portals: paths of the PortalLights, hints for sampling domes.
     frame: time code, None for the default time.
+    neighbours: a frame before and a frame after; empty unless asked for, and at the default time.
     assets: path of a drawn prim → path of the component that it is part of; empty unless asked for.
     resolution, pixel_aspect, conform, data_window: of the stage's UsdRenderSettings, where it names one; the window
         is (xmin, ymin, xmax, ymax), 0..1 over the image, y up.
@@ -45,6 +48,7 @@ class Scene:
     lights: tuple[Light, ...]
     camera: Camera
     cameras: tuple[str, ...] = ()
+    portals: tuple[str, ...] = ()
     unsupported: tuple[Unsupported, ...] = ()
     meters_per_unit: float = 0.01
     up_axis: str = "Y"
@@ -53,6 +57,7 @@ class Scene:
     resolution: tuple[int, int] | None = None
     pixel_aspect: float = 1.0
     assets: Mapping[str, str] = field(default_factory=dict)
+    neighbours: tuple[Moment, ...] = ()
     conform: ConformPolicy = "expandAperture"
     data_window: tuple[float, float, float, float] = WHOLE_IMAGE
     rendering_space: str | None = None

@@ -17,6 +17,7 @@ from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import UNBOUND
+from defshade_cli.scene.motion import Moment, moment_of
 from defshade_cli.scene.scene import Scene, Unsupported
 from defshade_cli.settings import Complexity
 from defshade_cli.usd import stage as facts
@@ -28,6 +29,7 @@ from defshade_cli.usd.instancing import Piece
 from defshade_cli.usd.light import camera_light
 from defshade_cli.usd.linking import link
 from defshade_cli.usd.memory import Memory
+from defshade_cli.usd.mesh_light import Glow, Glows, glowing_lights, shown_material
 from defshade_cli.usd.palette import Palette
 from defshade_cli.usd.polygons import Polygons
 from defshade_cli.usd.settings import read_settings
@@ -38,15 +40,19 @@ from defshade_cli.usd.unresolved import find_unresolved
 log = logging.getLogger("defshade")
 
 PlacedSurface = tuple[Piece, Surface]
+Glowing = tuple[Glow, tuple[Light, ...]]
 
 
 class StageReader:
     """Reads frames of one stage. What does not change over time is read once, and stays the same object.
 
-    camera: path or name; without it the rule of usd/camera.py picks.  purposes: of the geometry that is drawn.
+    camera: path or name; without it the rule of usd/camera.py picks.
+    purposes: of the geometry that is drawn; without them those of the render settings.
+    render_settings, product: paths of their prims; settings are found as usd/products.py does.
     complexity: of subdivision surfaces; for `auto` it matters how large the image is, see scene.camera.image_size.
     extras: what only some layers need.
-    Raises PrimNotFound for a camera that the stage lacks.
+    beside: a reader of the same stage, whose memory is shared.
+    Raises PrimNotFound for a camera or render settings that the stage lacks.
     """
 
     def __init__(
@@ -54,18 +60,21 @@ class StageReader:
         stage: Usd.Stage,
         *,
         camera: str | None = None,
-        purposes: Sequence[str] = ("default", "render"),
+        purposes: Sequence[str] | None = None,
+        render_settings: str | None = None,
+        product: str = "",
         complexity: Complexity = "auto",
         size: tuple[int, int] | None = None,
         width: int | None = None,
         extras: Extras = NO_EXTRAS,
+        beside: StageReader | None = None,
     ) -> None:
-        self._stage, self._purposes = stage, tuple(purposes)
         self._complexity, self._size, self._width = complexity, size, width
         self._extras = extras
-        self._memory = Memory(stage, extras)
-        self._tessellation = Tessellation()
-        self._settings = read_settings(stage)
+        self._memory: Memory = beside._memory if beside else Memory(stage, extras)
+        self._tessellation: Tessellation = beside._tessellation if beside else Tessellation()
+        self._settings = read_settings(stage, render_settings, product)
+        self._stage, self._purposes = stage, tuple(purposes or self._settings.purposes)
         self._cameras = find_cameras(stage)
         self._issues = tuple(arc.unsupported for arc in find_unresolved(stage))
         self._camera = choose_camera(stage, self._cameras, camera, self._settings.camera)
@@ -87,20 +96,32 @@ class StageReader:
         """
         time = Usd.TimeCode.Default() if frame is None else Usd.TimeCode(frame)
         with facts.gathered_diagnostics():
-            scene = self._read(frame, time)
+            levels: dict[str, int] = {}
+            scene = self._read(frame, time, levels)
+            if self._extras.motion and frame is not None:
+                neighbours = tuple(self._moment(scene, frame + step, levels) for step in (-1.0, 1.0))
+                scene = replace(scene, neighbours=neighbours)
         return _lit(scene)
 
-    def _read(self, frame: float | None, time: Usd.TimeCode) -> Scene:
+    def _moment(self, scene: Scene, frame: float, levels: dict[str, int]) -> Moment:
+        """What `scene` has, as it is at another frame, refined alike."""
+        then = self._read(frame, Usd.TimeCode(frame), levels)
+        return moment_of(scene.drawables, scene.meshes, then.camera, then.drawables, then.meshes)
+
+    def _read(self, frame: float | None, time: Usd.TimeCode, levels: dict[str, int]) -> Scene:
+        """levels: of refinement by path of the surface; those that are missing are chosen, and put in."""
         traversal = Traversal(self._stage, self._memory, time, self._purposes)
         pieces = traversal.read_stage()
         drawn = tuple(_drawn(pieces, self._purposes))
         if not drawn and not traversal.dormant:
             raise EmptyStage(_empty(self._stage, traversal.issues))
         camera, camera_issues = self._read_camera(time, drawn)
-        gprims = self._tessellate(drawn, camera)
+        gprims = self._tessellate(drawn, camera, levels)
         palette = Palette(self._memory, time)
         meshes: dict[Mesh, int] = {}
-        lights, drawables = link(self._stage, list(_lights(pieces)), list(_drawables(drawn, gprims, meshes, palette)))
+        glowing = _glowing(drawn, gprims, traversal.glows, palette)
+        shown = [*_drawables(drawn, gprims, meshes, palette, glowing)]
+        lights, drawables = link(self._stage, [*_lights(pieces), *_all(glowing)], shown)
         mended = dict.fromkeys(issue for gprim in gprims.values() for issue in gprim.issues)
         return Scene(
             name=facts.stage_name(self._stage),
@@ -108,6 +129,7 @@ class StageReader:
             drawables=drawables,
             materials=palette.materials,
             lights=lights,
+            portals=tuple(traversal.portals),
             camera=camera,
             cameras=self._cameras,
             unsupported=(*self._issues, *traversal.issues, *mended, *palette.issues, *camera_issues),
@@ -136,13 +158,18 @@ class StageReader:
         camera, issues = read_camera(self._camera, time)
         return self._settings.applied_to(camera), issues
 
-    def _tessellate(self, drawn: Iterable[PlacedSurface], camera: Camera) -> dict[Surface, Gprim]:
+    def _tessellate(
+        self, drawn: Iterable[PlacedSurface], camera: Camera, levels: dict[str, int]
+    ) -> dict[Surface, Gprim]:
         width, height = image_size(camera.aspect, self._size, self._width, self._settings.resolution)
         aspect = width * self._settings.pixel_aspect_for(camera) / height
         view = View(camera.conformed(aspect, self._settings.conform), height)
         placed = ((surface, piece.root_from_object) for piece, surface in drawn)
-        levels = choose_levels(placed, self._complexity, view)
-        return {surface: self._tessellation.at_level(surface, level) for surface, level in levels.items()}
+        chosen = choose_levels(placed, self._complexity, view)
+        return {
+            surface: self._tessellation.at_level(surface, levels.setdefault(surface.path, level))
+            for surface, level in chosen.items()
+        }
 
 
 def _drawn(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[PlacedSurface]:
@@ -152,7 +179,11 @@ def _drawn(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[PlacedS
 
 
 def _drawables(
-    drawn: Iterable[PlacedSurface], gprims: Mapping[Surface, Gprim], meshes: dict[Mesh, int], palette: Palette
+    drawn: Iterable[PlacedSurface],
+    gprims: Mapping[Surface, Gprim],
+    meshes: dict[Mesh, int],
+    palette: Palette,
+    glowing: Mapping[Piece, Glowing],
 ) -> Iterator[Drawable]:
     """What is drawn; `meshes` takes the meshes, each with its number."""
     alike: dict[tuple[int, tuple[Subset, ...], bool | Piece], list[Piece]] = {}
@@ -160,7 +191,12 @@ def _drawables(
         gprim = gprims[surface]
         if not gprim.groups:
             continue
-        subsets = tuple(Subset(palette.number(piece.bindings[g.path]), g.first, g.count) for g in gprim.groups)
+        materials = [palette.material(piece.bindings[group.path]) for group in gprim.groups]
+        if piece in glowing:
+            glow, lights = glowing[piece]
+            materials = [shown_material(material, glow, lights[0]) for material in materials]
+        numbered = zip(gprim.groups, map(palette.number_of, materials), strict=True)
+        subsets = tuple(Subset(number, group.first, group.count) for group, number in numbered)
         named = len(piece.paths) == len(piece.ids)
         mesh = meshes.setdefault(gprim.mesh, len(meshes))
         alike.setdefault((mesh, subsets, named or piece), []).append(piece)
@@ -189,6 +225,22 @@ def _joined(arrays: Sequence[NDArray]) -> NDArray:
 def _paths(drawables: Iterable[Drawable]) -> dict[str, None]:
     """Of every prim that is drawn, each once."""
     return dict.fromkeys(path for drawable in drawables for path in drawable.paths)
+
+
+def _glowing(
+    drawn: Iterable[PlacedSurface], gprims: Mapping[Surface, Gprim], glows: Glows, palette: Palette
+) -> dict[Piece, Glowing]:
+    """The surfaces that are lights, and these."""
+    found = ((piece, gprims[surface], glows[surface.path]) for piece, surface in drawn if surface.path in glows)
+    return {
+        piece: (glow, tuple(glowing_lights(piece, gprim, glow, palette.material)))
+        for piece, gprim, glow in found
+        if gprim.groups and len(piece.root_from_object)
+    }
+
+
+def _all(glowing: Mapping[Piece, Glowing]) -> Iterator[Light]:
+    return (light for _, lights in glowing.values() for light in lights)
 
 
 def _lights(pieces: Iterable[Piece]) -> Iterator[Light]:

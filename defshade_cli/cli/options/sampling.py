@@ -22,11 +22,23 @@ def sampling_options() -> list[Function]:
         option(
             "--samples",
             type=click.IntRange(min=1),
-            default=_RENDER.samples,
-            default_text=str(_RENDER.samples),
+            default_text=f"1, and {settings.MOST_SAMPLES} with --max-error or --time-limit",
             metavar="N",
             help="Samples a pixel of the beauty: places in the pixel, on the lens and on every light. One sample takes "
             "lights for points. Data layers are one sample at the pixel's centre.",
+        ),
+        option(
+            "--max-error",
+            type=Positive(),
+            metavar="ERROR",
+            help="End once 95 % of the image's tiles have this relative standard error, such as 0.01; --samples is the "
+            "most that a pixel gets then. A tile that has it gets no more samples.",
+        ),
+        option(
+            "--time-limit",
+            type=Positive(),
+            metavar="SECONDS",
+            help="End a frame once it has been drawn for so long; --samples is the most that a pixel gets then.",
         ),
         option(
             "--filter",

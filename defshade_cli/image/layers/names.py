@@ -15,6 +15,19 @@ ALIASES: dict[str, str] = {
     "color": "beauty",
     "cameraDepth": "depth",
     "primvars:st": "uv",
+    # RenderMan
+    "Ci": "beauty",
+    "a": "alpha",
+    "z": "depth",
+    "Nn": "normal",
+    # Karma
+    "C": "beauty",
+    "ray:hitP": "position",
+    "ray:hitN": "normal",
+    "ray:hitPz": "depth",
+    # files
+    "rgba": "beauty",
+    "rgb": "beauty",
     # Arnold
     "RGBA": "beauty",
     "A": "alpha",
@@ -23,6 +36,7 @@ ALIASES: dict[str, str] = {
     "N": "normal",
     "Ng": "geometricNormal",
     "ID": "primId",
+    "motionvector": "motionForward",
     "crypto_object": "cryptoObject",
     "crypto_material": "cryptoMaterial",
     "crypto_asset": "cryptoAsset",
@@ -38,6 +52,7 @@ ALIASES: dict[str, str] = {
     "Shadow": "shadow",
     "DiffCol": "albedo",
     "Emit": "emission",
+    "Vector": "motionForward",
     "IndexMA": "materialId",
     "CryptoObject": "cryptoObject",
     "CryptoMaterial": "cryptoMaterial",
