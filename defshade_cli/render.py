@@ -20,7 +20,7 @@ from defshade_cli.image.files import write
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import BEAUTY
 from defshade_cli.passes.pipeline import Pipeline
-from defshade_cli.plan import Plan, make_plan
+from defshade_cli.plan import Plan, make_plan, plan_moments
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Composition, RenderJob, RenderSettings
 
@@ -156,14 +156,16 @@ def _render_image(shot: Shot, opened: OpenJob, renderer: Renderer, command: str)
     if is_done(job, files, made_of):
         return ImageResult(files, skipped=True)
     seconds: dict[str, float] = {}
+    reader = opened.reader(shot.product)
     with _timed(seconds, "read"):
-        scene = opened.reader(shot.product).read(shot.frame)
+        scene = reader.read(shot.frame)
     with _timed(seconds, "plan"):
         plan = make_plan(scene, job.settings)
     with _timed(seconds, "context"):
         pipeline = renderer.pipeline(job.device)
     with _timed(seconds, "draw"):
-        film = pipeline.render(scene, plan)
+        moments = plan_moments(scene, plan, reader.read_shutter(scene, plan.moments), job.settings)
+        film = pipeline.render(scene, plan, moments)
     with _timed(seconds, "write"):
         facts = _provenance(shot, command) | film.metadata | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of}
         film = replace(film, metadata=facts)

@@ -99,6 +99,7 @@ class RenderSettings:
     shadows: False lights every surface that faces a light.
     complexity: how finely subdivision surfaces are refined: by their size in the image, or 0 to 3 levels all alike.
     background: dome lights are seen behind the geometry, and cover there.
+    motion_blur: several samples see as many moments of the camera's shutter.
     light_tolerance: scene-linear value that all dropped light together may reach in one pixel.
     """
 
@@ -122,6 +123,7 @@ class RenderSettings:
     shadows: bool = True
     complexity: Complexity = "auto"
     background: bool = True
+    motion_blur: bool = True
 
     @property
     def most_samples(self) -> int:

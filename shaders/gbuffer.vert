@@ -14,6 +14,10 @@ in vec4 vertex_uv;             // two sets
 in vec2 vertex_layer_uv;
 out vec2 layer_uv;
 #endif
+#ifdef PRIMVARS
+in mat4 vertex_primvars;
+out mat4 primvars;
+#endif
 #ifdef MOTION
 layout(std430, binding = 8) readonly buffer MotionBlock { Motion motions[]; };
 in vec3 position_before;
@@ -66,6 +70,9 @@ void main() {
 #endif
 #ifdef LAYER_UV
     layer_uv = vertex_layer_uv;
+#endif
+#ifdef PRIMVARS
+    primvars = vertex_primvars;
 #endif
 #ifdef MOTION
     Motion motion = motions[draw.x];

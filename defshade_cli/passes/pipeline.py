@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
@@ -28,7 +29,7 @@ from defshade_cli.passes.shadows import ShadowAtlas, ShadowPass
 from defshade_cli.passes.stopping import Stopping
 from defshade_cli.passes.tables import LightTables, TableStore
 from defshade_cli.passes.view import view_record
-from defshade_cli.plan import Plan
+from defshade_cli.plan import Plan, ShutterSample
 from defshade_cli.scene.scene import Scene
 
 Layers = dict[str, NDArray[np.float32]]
@@ -58,16 +59,20 @@ class Pipeline:
         self._accumulation = AccumulationPass(gpu, self._frame, self._screen)
         self._stopping = Stopping(gpu, self._frame, self._screen, self._mask)
 
-    def render(self, scene: Scene, plan: Plan) -> Film:
-        """The plan's layers. Raises GpuError."""
+    def render(self, scene: Scene, plan: Plan, moments: Iterator[ShutterSample] | None = None) -> Film:
+        """The plan's layers. Raises GpuError.
+
+        moments: what samples see in turn, where the plan has motion blur; data layers show the scene itself.
+        """
         self._gpu.make_current()
         draws = self._resident(scene, plan)
         layers: Layers = {}
         manifests: Manifests = {}
         sampling = Sampling(1, 1.0, 1)
         if plan.sampled:
-            layers, manifests, sampling = self._sampled_layers(draws, scene, plan)
+            layers, manifests, sampling = self._sampled_layers(draws, scene, plan, moments)
         if plan.data_layers:
+            draws = self._resident(scene, plan) if plan.moments else draws
             data = data_layers(self._data_planes(draws, plan), plan, scene)
             layers, manifests = layers | data, manifests | id_manifests(data, scene)
         return Film(
@@ -86,17 +91,20 @@ class Pipeline:
 
     def _resident(self, scene: Scene, plan: Plan) -> DrawList:
         """The scene on the GPU, with what the plan's planes read of it."""
-        if "MOTION" not in plan.inputs:
-            return self._scene.update(scene, plan.inputs)
-        self._motions.write(motion_records(scene, plan))
-        return self._scene.update(scene, plan.inputs, tuple(neighbouring_points(scene)))
+        moved: tuple[NDArray[np.float32], ...] = ()
+        if "MOTION" in plan.inputs:
+            self._motions.write(motion_records(scene, plan))
+            moved = tuple(neighbouring_points(scene))
+        return self._scene.update(scene, plan.inputs, moved, plan.primvars)
 
     def planes(self, scene: Scene, plan: Plan) -> Planes:
         """The float GBuffer at the pixels' centres: what the float64 reference is evaluated on."""
         self._gpu.make_current()
         return self._drawn_planes(self._scene.update(scene), plan.planes, plan)
 
-    def _sampled_layers(self, draws: DrawList, scene: Scene, plan: Plan) -> tuple[Layers, Manifests, Sampling]:
+    def _sampled_layers(
+        self, draws: DrawList, scene: Scene, plan: Plan, moments: Iterator[ShutterSample] | None
+    ) -> tuple[Layers, Manifests, Sampling]:
         """What is a mean over samples or tells of them, and what ids in it stand for."""
         mattes = Mattes(scene, plan)
         gbuffer = self._frame.gbuffer(plan.size, plan.planes, plan.layout)
@@ -107,6 +115,9 @@ class Pipeline:
         self._accumulation.begin(plan.size, plan.samples)
         self._stopping.begin(plan)
         for sample in samples(plan.samples, plan.filter, plan.filter_width):
+            if moments and plan.moments and sample.index % plan.samples_a_moment == 0:
+                scene, plan = next(moments)
+                draws, tables = self._scene.update(scene, plan.inputs), self._tables.update(plan)
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             if plan.mattes:
                 mattes.add(gbuffer.target.read("visible"))

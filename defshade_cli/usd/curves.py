@@ -16,7 +16,7 @@ from defshade_cli.usd.basis import LARGEST_DETAIL, CurveSamples, Kind, sample_cu
 from defshade_cli.usd.points import read_widths
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.positions import read_positions
-from defshade_cli.usd.primvars import Authored, authored, fit, read_carried
+from defshade_cli.usd.primvars import DISPLAY_COLOR, Authored, authored, fit, read_carried
 from defshade_cli.usd.tubes import ribbons, tubes
 from defshade_cli.usd.values import integers
 
@@ -30,7 +30,9 @@ _DETAILS = ((LARGEST_DETAIL, 12), (4, 6), (2, 3))
 """Samples a segment of cubic curves, and sides of tubes."""
 
 
-def read_curves(curves: UsdGeom.BasisCurves, time: Usd.TimeCode, issues: list[str]) -> Polygons:
+def read_curves(
+    curves: UsdGeom.BasisCurves, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR
+) -> Polygons:
     """All curves of the prim, each a face in the sense of `Polygons.faces`. Bad data becomes issues."""
     points = read_positions(curves.GetPrim(), time)
     counts = integers(curves.GetCurveVertexCountsAttr().Get(time) or [])
@@ -43,7 +45,7 @@ def read_curves(curves: UsdGeom.BasisCurves, time: Usd.TimeCode, issues: list[st
     samples, sides = _detailed(kind, counts, len(points))
     if samples.left_out:
         issues.append(f"{samples.left_out} curves are left out: they have too few points, or cannot be closed")
-    return _build(curves, samples, points, sides, time, issues)
+    return _build(curves, samples, points, sides, time, issues, color)
 
 
 def _complete(counts: NDArray[np.integer], available: int, issues: list[str]) -> NDArray[np.int64]:
@@ -78,6 +80,7 @@ def _build(
     sides: int,
     time: Usd.TimeCode,
     issues: list[str],
+    color: str,
 ) -> Polygons:
     prim = curves.GetPrim()
 
@@ -86,7 +89,7 @@ def _build(
     authored_normals = fit(_normals(curves, time), 3, samples.elements, issues)
     normals = None if authored_normals is None else samples.at(authored_normals)
     shape = tubes(samples, centres, radii, sides) if normals is None else ribbons(samples, centres, radii, normals)
-    shape = read_carried(prim, time, samples.elements, issues).laid_on(shape)
+    shape = read_carried(prim, time, samples.elements, issues, color).laid_on(shape)
     around = len(shape.points) // max(samples.count, 1)
     return shape.with_primvars(lambda p: p if p is shape.normals else _around(p, samples, around))
 

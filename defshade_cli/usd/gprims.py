@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pxr import Usd
 
 from defshade_cli.usd.polygons import Polygons
-from defshade_cli.usd.primvars import Elements, count_elements, read_carried
+from defshade_cli.usd.primvars import DISPLAY_COLOR, Elements, count_elements, read_carried
 from defshade_cli.usd.revolution import SEGMENTS, Strip, arc, disk, revolve, side
 from defshade_cli.usd.values import floats
 
@@ -95,7 +95,7 @@ def size_attributes(prim: Usd.Prim) -> tuple[str, ...]:
     return names
 
 
-def read_solid(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> Polygons | None:
+def read_solid(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR) -> Polygons | None:
     """The gprim tessellated; None for any other type, no faces where a size is no size."""
     if prim.GetTypeName() not in _GPRIMS:
         return None
@@ -105,7 +105,7 @@ def read_solid(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> Polygon
         names = names[::-1]  # length comes first in cyclic order, by the schema's table of axes
     sizes = [_size(prim, name, time, issues) for name in names]
     polygons = _built(build, axis, tuple(sizes))
-    return read_carried(prim, time, _elements(polygons), issues).laid_on(polygons)
+    return read_carried(prim, time, _elements(polygons), issues, color).laid_on(polygons)
 
 
 @lru_cache(maxsize=_MOST_KEPT)

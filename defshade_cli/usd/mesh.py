@@ -9,7 +9,15 @@ from pxr import Usd, UsdGeom
 from defshade_cli.usd.normals import mend_normals
 from defshade_cli.usd.polygons import SCHEMES, Polygons, Primvar, Scheme
 from defshade_cli.usd.positions import read_positions
-from defshade_cli.usd.primvars import Authored, Elements, authored, count_elements, fit, read_carried
+from defshade_cli.usd.primvars import (
+    DISPLAY_COLOR,
+    Authored,
+    Elements,
+    authored,
+    count_elements,
+    fit,
+    read_carried,
+)
 from defshade_cli.usd.values import integers
 
 MESH_ATTRIBUTES = ("points", "faceVertexCounts", "faceVertexIndices", "holeIndices", "normals")
@@ -18,7 +26,7 @@ MESH_ATTRIBUTES = ("points", "faceVertexCounts", "faceVertexIndices", "holeIndic
 _NONE = np.empty(0, np.int32)
 
 
-def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> Polygons:
+def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR) -> Polygons:
     """The mesh as authored, before refinement: faces that cannot be drawn are left out, holes stay."""
     said = set(mesh.GetPrim().GetAuthoredPropertyNames())
     points = _points(mesh, time, issues)
@@ -36,7 +44,7 @@ def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> Poly
         left_handed="orientation" in said and mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded,
         normals=_normals(mesh, time, elements, issues) if has_normals else None,
     )
-    polygons = read_carried(mesh.GetPrim(), time, elements, issues).laid_on(polygons)
+    polygons = read_carried(mesh.GetPrim(), time, elements, issues, color).laid_on(polygons)
     return mend_normals(_without_broken_faces(polygons, issues), issues)
 
 

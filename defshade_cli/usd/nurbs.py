@@ -15,7 +15,7 @@ from scipy.interpolate import BSpline
 
 from defshade_cli.usd.normals import mend_normals
 from defshade_cli.usd.polygons import Polygons, Primvar
-from defshade_cli.usd.primvars import read_carried
+from defshade_cli.usd.primvars import DISPLAY_COLOR, read_carried
 from defshade_cli.usd.values import floats
 
 PATCH_ATTRIBUTES = (
@@ -47,7 +47,9 @@ class _Direction:
         return (spline.derivative() if derivative else spline)(self.at)
 
 
-def read_patch(patch: UsdGeom.NurbsPatch, time: Usd.TimeCode, issues: list[str]) -> Polygons:
+def read_patch(
+    patch: UsdGeom.NurbsPatch, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR
+) -> Polygons:
     """The whole patch; trim curves are not cut. Bad data becomes issues."""
     prim = patch.GetPrim()
     if patch.GetTrimCurveCountsAttr().Get(time):
@@ -64,7 +66,7 @@ def read_patch(patch: UsdGeom.NurbsPatch, time: Usd.TimeCode, issues: list[str])
     surface = replace(
         _grid(points, -normals if left_handed else normals),
         left_handed=left_handed,
-        **read_carried(prim, time, elements, issues)._asdict(),
+        **read_carried(prim, time, elements, issues, color)._asdict(),
     )
     return mend_normals(surface.with_primvars(lambda p: p if p is surface.normals else _sampled(p, u, v)), [])
 

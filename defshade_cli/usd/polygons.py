@@ -52,6 +52,7 @@ class Polygons:
     left_handed: the corners run clockwise seen from outside.
     normals: None where they follow from the shape.
     uvs: texture coordinates (N, 2) by name.
+    shown: primvars (N, 1 to 4) by name that only layers show.
     """
 
     points: NDArray[np.float32]
@@ -65,11 +66,12 @@ class Polygons:
     display_color: Primvar | None = None
     display_opacity: Primvar | None = None
     uvs: Mapping[str, Primvar] = field(default_factory=dict)
+    shown: Mapping[str, Primvar] = field(default_factory=dict)
 
     @property
     def primvars(self) -> tuple[Primvar, ...]:
         """All that lies on the faces, points and corners."""
-        named = (self.normals, self.display_color, self.display_opacity, *self.uvs.values())
+        named = (self.normals, self.display_color, self.display_opacity, *self.uvs.values(), *self.shown.values())
         return tuple(primvar for primvar in named if primvar is not None)
 
     @cached_property
@@ -146,6 +148,7 @@ class Polygons:
             display_color=changed(self.display_color),
             display_opacity=changed(self.display_opacity),
             uvs={name: change(uv) for name, uv in self.uvs.items()},
+            shown={name: change(primvar) for name, primvar in self.shown.items()},
         )
 
     def without_constants(self) -> Polygons:
@@ -159,10 +162,18 @@ class Polygons:
     @cached_property
     def digest(self) -> bytes:
         """Equal for polygons that are equal in everything."""
-        found = blake2b(repr((self.scheme, self.left_handed, tuple(self.uvs))).encode(), digest_size=16)
+        found = blake2b(
+            repr((self.scheme, self.left_handed, tuple(self.uvs), tuple(self.shown))).encode(), digest_size=16
+        )
         for array in (self.points, self.counts, self.indices, self.faces, self.holes):
             _add(found, array)
-        for primvar in (self.normals, self.display_color, self.display_opacity, *self.uvs.values()):
+        for primvar in (
+            self.normals,
+            self.display_color,
+            self.display_opacity,
+            *self.uvs.values(),
+            *self.shown.values(),
+        ):
             found.update(b"none" if primvar is None else primvar.interpolation.encode())
             if primvar is not None:
                 _add(found, primvar.values)

@@ -6,6 +6,8 @@ import logging
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
+from itertools import cycle
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +18,6 @@ from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
 from defshade_cli.scene.light import Light
-from defshade_cli.scene.material import UNBOUND
 from defshade_cli.scene.motion import Moment, moment_of
 from defshade_cli.scene.scene import Scene, Unsupported
 from defshade_cli.settings import Complexity
@@ -24,7 +25,7 @@ from defshade_cli.usd import stage as facts
 from defshade_cli.usd.camera import choose_camera, find_cameras, framed_camera, read_camera
 from defshade_cli.usd.complexity import View, choose_levels
 from defshade_cli.usd.geometry import Gprim, Surface
-from defshade_cli.usd.identity import read_assets
+from defshade_cli.usd.identity import read_assets, read_labels
 from defshade_cli.usd.instancing import Piece
 from defshade_cli.usd.light import camera_light
 from defshade_cli.usd.linking import link
@@ -33,6 +34,7 @@ from defshade_cli.usd.mesh_light import Glow, Glows, glowing_lights, shown_mater
 from defshade_cli.usd.palette import Palette
 from defshade_cli.usd.polygons import Polygons
 from defshade_cli.usd.settings import read_settings
+from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.tessellation import Tessellation
 from defshade_cli.usd.traversal import Traversal
 from defshade_cli.usd.unresolved import find_unresolved
@@ -75,6 +77,8 @@ class StageReader:
         self._tessellation: Tessellation = beside._tessellation if beside else Tessellation()
         self._settings = read_settings(stage, render_settings, product)
         self._stage, self._purposes = stage, tuple(purposes or self._settings.purposes)
+        self._levels: dict[str, int] = {}
+        self._lights: dict[str, Light] = {}
         self._cameras = find_cameras(stage)
         self._issues = tuple(arc.unsupported for arc in find_unresolved(stage))
         self._camera = choose_camera(stage, self._cameras, camera, self._settings.camera)
@@ -96,12 +100,23 @@ class StageReader:
         """
         time = Usd.TimeCode.Default() if frame is None else Usd.TimeCode(frame)
         with facts.gathered_diagnostics():
-            levels: dict[str, int] = {}
+            levels = self._levels = {}
             scene = self._read(frame, time, levels)
             if self._extras.motion and frame is not None:
                 neighbours = tuple(self._moment(scene, frame + step, levels) for step in (-1.0, 1.0))
                 scene = replace(scene, neighbours=neighbours)
         return _lit(scene)
+
+    def read_shutter(self, scene: Scene, count: int) -> Iterator[Scene]:
+        """The frame of `scene` again and again, at `count` times of its shutter in turn, without end.
+
+        Surfaces are refined as often as at the frame itself.
+        """
+        assert scene.frame is not None
+        for offset in cycle(scene.camera.shutter_times(count)):
+            time = Usd.TimeCode(scene.frame + offset)
+            with facts.silence():
+                yield _lit(self._read(scene.frame, time, self._levels))
 
     def _moment(self, scene: Scene, frame: float, levels: dict[str, int]) -> Moment:
         """What `scene` has, as it is at another frame, refined alike."""
@@ -121,7 +136,8 @@ class StageReader:
         meshes: dict[Mesh, int] = {}
         glowing = _glowing(drawn, gprims, traversal.glows, palette)
         shown = [*_drawables(drawn, gprims, meshes, palette, glowing)]
-        lights, drawables = link(self._stage, [*_lights(pieces), *_all(glowing)], shown)
+        shining = self._shared_lights([*_lights(pieces), *_all(glowing)])
+        lights, drawables = link(self._stage, shining, shown)
         mended = dict.fromkeys(issue for gprim in gprims.values() for issue in gprim.issues)
         return Scene(
             name=facts.stage_name(self._stage),
@@ -136,14 +152,26 @@ class StageReader:
             meters_per_unit=facts.meters_per_unit(self._stage),
             up_axis=facts.up_axis(self._stage),
             frame=frame,
+            moves=frame is not None and camera.shutter[0] < camera.shutter[1] and self._may_change,
             frames_per_second=facts.frames_per_second(self._stage),
             resolution=self._settings.resolution,
             pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
             data_window=self._settings.data_window,
+            labels=read_labels(self._stage, _paths(drawables), time) if self._extras.labels else {},
             assets=read_assets(self._stage, _paths(drawables)) if self._extras.assets else {},
             rendering_space=self._settings.rendering_space,
         )
+
+    @cached_property
+    def _may_change(self) -> bool:
+        return facts.may_change(self._stage)
+
+    def _shared_lights(self, lights: Iterable[Light]) -> list[Light]:
+        """Lights that are as they were when last read are the same objects."""
+        found = [shared(light, self._lights.get(light.path)) for light in lights]
+        self._lights = {light.path: light for light in found}
+        return found
 
     def _read_camera(
         self, time: Usd.TimeCode, drawn: Iterable[PlacedSurface]
@@ -186,7 +214,8 @@ def _drawables(
     glowing: Mapping[Piece, Glowing],
 ) -> Iterator[Drawable]:
     """What is drawn; `meshes` takes the meshes, each with its number."""
-    alike: dict[tuple[int, tuple[Subset, ...], bool | Piece], list[Piece]] = {}
+    alike: dict[tuple[int, tuple[Subset, ...], bool | Piece], list[Piece]] = defaultdict(list)
+    unauthored: dict[tuple[Subset, ...], Material] = {}
     for piece, surface in drawn:
         gprim = gprims[surface]
         if not gprim.groups:
@@ -199,13 +228,14 @@ def _drawables(
         subsets = tuple(Subset(number, group.first, group.count) for group, number in numbered)
         named = len(piece.paths) == len(piece.ids)
         mesh = meshes.setdefault(gprim.mesh, len(meshes))
-        alike.setdefault((mesh, subsets, named or piece), []).append(piece)
+        alike[mesh, subsets, named or piece].append(piece)
+        unauthored[subsets] = materials[0]
     for (mesh, subsets, _), pieces in alike.items():
-        yield _drawable(mesh, subsets, pieces)
+        yield _drawable(mesh, subsets, pieces, unauthored[subsets])
 
 
-def _drawable(mesh: int, subsets: tuple[Subset, ...], pieces: Sequence[Piece]) -> Drawable:
-    """Pieces of the same looks as instances of one mesh."""
+def _drawable(mesh: int, subsets: tuple[Subset, ...], pieces: Sequence[Piece], unauthored: Material) -> Drawable:
+    """Pieces of the same looks as instances of one mesh. unauthored: has the colour of those that have none."""
     color, opacity = _joined([p.display_color for p in pieces]), _joined([p.display_opacity for p in pieces])
     return Drawable(
         mesh=mesh,
@@ -213,8 +243,8 @@ def _drawable(mesh: int, subsets: tuple[Subset, ...], pieces: Sequence[Piece]) -
         subsets=subsets,
         paths=tuple(path for piece in pieces for path in piece.paths),
         instance_ids=_joined([piece.ids for piece in pieces]),
-        display_color=np.nan_to_num(color, nan=UNBOUND.diffuse_color[0]),
-        display_opacity=np.nan_to_num(opacity, nan=UNBOUND.opacity),
+        display_color=np.where(np.isnan(color), unauthored.diffuse_color, color),
+        display_opacity=np.nan_to_num(opacity, nan=unauthored.opacity),
     )
 
 

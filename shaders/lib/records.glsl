@@ -38,6 +38,7 @@ struct Material {
     float opacity_threshold;
     uint use_specular_workflow;
     uint uses_display_color;
+    uint uses_display_opacity;
     uint one_sided;
     uint first_input;          // of its textures
     uint input_count;
