@@ -18,6 +18,7 @@ from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
 from defshade_cli.scene.light import Light
+from defshade_cli.scene.material import Material
 from defshade_cli.scene.motion import Moment, moment_of
 from defshade_cli.scene.scene import Scene, Unsupported
 from defshade_cli.settings import Complexity
