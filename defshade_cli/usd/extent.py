@@ -25,9 +25,11 @@ def extent_of(stage: Usd.Stage, surface: Surface, time: Usd.TimeCode) -> NDArray
     A cage is smaller than its solid, and what has no faces has no corners at all: for these USD is asked, which takes
     the authored extent, else computes one.
     """
+    if surface.copies is not None or (surface.groups and surface.control is None):
+        return surface.polygons.bounds
     prim = stage.GetPrimAtPath(surface.path)
     is_solid = surface.control is not None and not prim.IsA(UsdGeom.Mesh)
-    if surface.copies is not None or not prim.IsA(UsdGeom.Gprim) or (surface.groups and not is_solid):
+    if not prim.IsA(UsdGeom.Gprim) or (surface.groups and not is_solid):
         return surface.polygons.bounds
     gprim = UsdGeom.Boundable(prim)
     authored = gprim.GetExtentAttr().Get(time) if gprim.GetExtentAttr().HasAuthoredValue() else None
