@@ -9,8 +9,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.gpu.planes import MOST_TARGETS, Plane, named_planes, needed_planes
-from defshade_cli.image.layers import BEAUTY, LAYERS, resolve
+from defshade_cli.errors import UsageError
+from defshade_cli.gpu.planes import MOST_PRIMVARS, MOST_TARGETS, Plane, named_planes, needed_planes
+from defshade_cli.image.layers import BEAUTY, LAYERS, PRIMVAR_FAMILY, resolve
 from defshade_cli.image.ocio import find_render_space
 from defshade_cli.image.render_space import RenderSpace
 from defshade_cli.plan.decisions import Decision, explain
@@ -120,6 +121,11 @@ class Plan:
         return frozenset(name for plane in (*self.planes, *self.data_planes) for name in plane.inputs)
 
     @property
+    def primvars(self) -> tuple[str, ...]:
+        """Names of the primvars that layers show, in the order of their planes."""
+        return primvar_names(self.layers)
+
+    @property
     def outputs(self) -> tuple[str, ...]:
         """Layers that the light volumes write beside their radiance."""
         return light_outputs(self.layers)
@@ -222,16 +228,10 @@ ShutterSample = tuple[Scene, Plan]
 """What is there while the shutter is open, at one time."""
 
 
-def plan_moments(scene: Scene, plan: Plan, seen: Iterator[Scene], settings: RenderSettings) -> Iterator[ShutterSample]:
-    """What the samples see in turn: `seen` with plans that fill the same planes.
-
-    Where a matte is asked for, which counts what the frame draws, a moment that draws something else shows the frame.
-    """
+def plan_moments(plan: Plan, seen: Iterator[Scene], settings: RenderSettings) -> Iterator[ShutterSample]:
+    """What the samples see in turn: `seen` with plans that fill the same planes."""
     for moment in seen:
-        if plan.mattes and not moment.draws_like(scene):
-            yield scene, plan
-        else:
-            yield moment, replace(make_plan(moment, settings), planes=plan.planes)
+        yield moment, replace(make_plan(moment, settings), planes=plan.planes)
 
 
 def _seen_lights(lights: tuple[PlannedLight, ...], layers: tuple[str, ...]) -> tuple[PlannedLight, ...]:
@@ -239,6 +239,11 @@ def _seen_lights(lights: tuple[PlannedLight, ...], layers: tuple[str, ...]) -> t
     if any(LAYERS[name].source == "lighting" for name in layers):
         return lights
     return tuple(planned for planned in lights if isinstance(planned.light, DomeLight))
+
+
+def primvar_names(layers: tuple[str, ...]) -> tuple[str, ...]:
+    """Of the layers that show primvars, these."""
+    return tuple(name.removeprefix(PRIMVAR_FAMILY) for name in layers if name.startswith(PRIMVAR_FAMILY))
 
 
 def _divide_planes(
@@ -252,7 +257,10 @@ def _divide_planes(
     rows = [LAYERS[name] for name in layers]
     lit = _lit_planes(scene) if any(row.source == "lighting" for row in rows) else ()
     lit += named_planes("visible" for row in rows if row.source == "matte")
-    data = named_planes(row.source for row in rows)
+    shown = primvar_names(layers)
+    if len(shown) > MOST_PRIMVARS:
+        raise UsageError(f"{len(shown)} primvars are asked for as layers, and {MOST_PRIMVARS} can be shown at once")
+    data = named_planes([row.source for row in rows] + [f"primvar_{i}" for i in range(len(shown))])
     both = named_planes(plane.name for plane in (*lit, *data))
     sampled, has_data = any(row.is_sampled for row in rows), not all(row.is_sampled for row in rows)
     exact = settings.layout == "float" and settings.most_samples == 1 and not cutout and len(both) <= MOST_TARGETS

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from hashlib import blake2b
 from typing import Literal
 
 import numpy as np
@@ -51,6 +52,7 @@ class Polygons:
     left_handed: the corners run clockwise seen from outside.
     normals: None where they follow from the shape.
     uvs: texture coordinates (N, 2) by name.
+    shown: primvars (N, 1 to 4) by name that only layers show.
     """
 
     points: NDArray[np.float32]
@@ -64,11 +66,12 @@ class Polygons:
     display_color: Primvar | None = None
     display_opacity: Primvar | None = None
     uvs: Mapping[str, Primvar] = field(default_factory=dict)
+    shown: Mapping[str, Primvar] = field(default_factory=dict)
 
     @property
     def primvars(self) -> tuple[Primvar, ...]:
         """All that lies on the faces, points and corners."""
-        named = (self.normals, self.display_color, self.display_opacity, *self.uvs.values())
+        named = (self.normals, self.display_color, self.display_opacity, *self.uvs.values(), *self.shown.values())
         return tuple(primvar for primvar in named if primvar is not None)
 
     @cached_property
@@ -92,6 +95,12 @@ class Polygons:
 
     def by_size(self) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         """Blocks of B faces that all have n corners: the faces (B,), and their corners (B, n)."""
+        if not len(self.counts):
+            return
+        smallest, largest = int(self.counts.min()), int(self.counts.max())
+        if smallest == largest:
+            yield from self._blocks(largest)
+            return
         starts = np.cumsum(self.counts, dtype=np.intp) - self.counts
         for size in np.flatnonzero(np.bincount(self.counts)):
             block = max(1, _CORNERS_AT_ONCE // int(size))
@@ -99,6 +108,14 @@ class Polygons:
             for first in range(0, len(sized), block):
                 faces = sized[first : first + block]
                 yield faces, starts[faces, None] + np.arange(size)
+
+    def _blocks(self, size: int) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """The same where all faces have `size` corners."""
+        corners = np.arange(len(self.indices)).reshape(-1, size)
+        block = max(1, _CORNERS_AT_ONCE // size)
+        for first in range(0, len(corners), block):
+            part = corners[first : first + block]
+            yield np.arange(first, first + len(part)), part
 
     def any_corner(self, corners: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(F,) the faces with a corner for which `corners` (C,) holds."""
@@ -131,13 +148,44 @@ class Polygons:
             display_color=changed(self.display_color),
             display_opacity=changed(self.display_opacity),
             uvs={name: change(uv) for name, uv in self.uvs.items()},
+            shown={name: change(primvar) for name, primvar in self.shown.items()},
         )
+
+    def without_constants(self) -> Polygons:
+        """Without the colour and the opacity that all of it has; a surface knows those."""
+        color = _unless_constant(self.display_color)
+        opacity = _unless_constant(self.display_opacity)
+        if color is self.display_color and opacity is self.display_opacity:
+            return self
+        return replace(self, display_color=color, display_opacity=opacity)
+
+    @cached_property
+    def digest(self) -> bytes:
+        """Equal for polygons that are equal in everything."""
+        found = blake2b(
+            repr((self.scheme, self.left_handed, tuple(self.uvs), tuple(self.shown))).encode(), digest_size=16
+        )
+        for array in (self.points, self.counts, self.indices, self.faces, self.holes):
+            _add(found, array)
+        for primvar in (
+            self.normals,
+            self.display_color,
+            self.display_opacity,
+            *self.uvs.values(),
+            *self.shown.values(),
+        ):
+            found.update(b"none" if primvar is None else primvar.interpolation.encode())
+            if primvar is not None:
+                _add(found, primvar.values)
+        return found.digest()
 
     def without_holes(self) -> Polygons:
         return self.select(~np.isin(self.faces, self.holes)) if len(self.holes) else self
 
     def joined(self) -> Polygons:
         """The same with every primvar joined."""
+        if all(primvar.interpolation != "faceVarying" for primvar in self.primvars):
+            return self
         return self.with_primvars(self.join)
 
     def join(self, primvar: Primvar) -> Primvar:
@@ -171,3 +219,13 @@ class Polygons:
         """(P, ...) a primvar that does not split points."""
         assert not primvar.splits_points
         return np.broadcast_to(primvar.values, (len(self.points), *primvar.values.shape[1:]))
+
+
+def _unless_constant(primvar: Primvar | None) -> Primvar | None:
+    return None if primvar is not None and primvar.interpolation == "constant" else primvar
+
+
+def _add(found: blake2b, array: NDArray) -> None:
+    """The size too, so that what ends one array does not begin the next."""
+    found.update(f"{array.dtype.str}{array.shape}".encode())
+    found.update(np.ascontiguousarray(array).data)

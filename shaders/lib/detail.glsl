@@ -6,6 +6,7 @@ struct Detail {
     vec3 tangent;              // unit, or 0
     vec2 uv;
     float occlusion;
+    mat4 primvars;             // four at most, a column each
     vec4 motion;               // pixels, y up: to where it was a frame before, to where it is a frame later
     uvec2 visible;             // 1 + row of the draw list, triangle of its command; (0, 0) is the background
 };

@@ -14,7 +14,6 @@ ALIASES: dict[str, str] = {
     # Hydra: HdAovTokens
     "color": "beauty",
     "cameraDepth": "depth",
-    "primvars:st": "uv",
     # RenderMan
     "Ci": "beauty",
     "a": "alpha",

@@ -91,16 +91,20 @@ ROWS: dict[str, Layer] = {
         _id("instanceId", "visible", "which instance of the prim; −1 for what is none"),
         _id("elementId", "visible", "the face of the mesh as authored"),
         _id("materialId", "visible", "the material: the manifest has its path"),
+        _id("semantic", "visible", "what the prim is: the manifest has its labels"),
         _matte("cryptoObject", "Cryptomatte of prims"),
         _matte("cryptoMaterial", "Cryptomatte of materials"),
         _matte("cryptoAsset", "Cryptomatte of components, as model kinds have them"),
     )
 }
 
-LIGHT_FAMILY = "light:"
+LIGHT_FAMILY, PRIMVAR_FAMILY = "light:", "primvars:"
 DEFAULT_GROUP = f"{LIGHT_FAMILY}default"
 
 FAMILIES: dict[str, Layer] = {
+    PRIMVAR_FAMILY: Layer(
+        f"{PRIMVAR_FAMILY}NAME", (*_XYZ, "W"), "as authored", "as authored", "primvar", 0.0, False, "a primvar"
+    ),
     LIGHT_FAMILY: _light(f"{LIGHT_FAMILY}GROUP", "light of a group: by name, light's name or path; * matches any"),
 }
 """Rows for any number of layers, by how their names begin."""
