@@ -118,6 +118,7 @@ class Pipeline:
             if moments and plan.moments and sample.index % plan.samples_a_moment == 0:
                 scene, plan = next(moments)
                 draws, tables = self._scene.update(scene, plan.inputs), self._tables.update(plan)
+                mattes.see(scene)
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             if plan.mattes:
                 mattes.add(gbuffer.target.read("visible"))
