@@ -23,15 +23,15 @@ from defshade_cli.usd.subsets import material_subsets
 class Memory:
     """The unchanging parts of one stage, and the names of what stands in its prototypes.
 
-    kinds: of prims.  rigs: what skeletons deform.
+    as_cages: see gprims.read_solid.  kinds: of prims.  rigs: what skeletons deform.
     xforms: USD's cache, which drops only what varies when its time is set.
     """
 
-    def __init__(self, stage: Usd.Stage, extras: Extras = NO_EXTRAS) -> None:
+    def __init__(self, stage: Usd.Stage, extras: Extras = NO_EXTRAS, *, as_cages: bool = False) -> None:
         self.kinds = Kinds()
         self.rigs = Rigs()
         self.xforms = UsdGeom.XformCache()
-        self._stage, self._extras = stage, extras
+        self._stage, self._extras, self._as_cages = stage, extras, as_cages
         self._shapes = Shapes()
         self._surfaces: dict[Sdf.Path, tuple[Usd.TimeCode, Surface | None]] = {}
         self._time_varying: dict[Sdf.Path, bool] = {}
@@ -69,7 +69,7 @@ class Memory:
 
     def _read_surface(self, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
         color = self._color_primvar(prim, time)
-        surface = read_surface(prim, time, color, self._extras.primvars, self._shapes)
+        surface = read_surface(prim, time, color, self._extras.primvars, self._shapes, as_cages=self._as_cages)
         return None if surface is None else self._as_shown(surface, prim.GetPath())
 
     def stand_in(self, prim: Usd.Prim, mode: str) -> Surface:

@@ -145,9 +145,7 @@ class Traversal:
         if surface.groups and here.rig:
             surface, here = self._deformed(prim, surface, here, here.rig)
         self.issues.update(dict.fromkeys(surface.issues))
-        if not surface.groups:
-            self.dormant |= is_time_varying(prim)
-            return
+        self.dormant |= not surface.groups and is_time_varying(prim)
         yield self._piece(prim, here, surface, {path: self._memory.bindings(path) for path in surface.groups})
 
     def _deformed(self, prim: Usd.Prim, rest: Surface, here: Standing, rig: Rig) -> tuple[Surface, Standing]:
