@@ -6,6 +6,7 @@
 #   make docs    write docs/commands.md anew from the commands
 #   make tables  measure the layouts anew, for the table in docs/lighting.md
 #   make accuracy  measure accumulated light against Mitsuba 3, into docs/accuracy.md
+#   make error-check  compare the errors that renders claim with those that they have, into docs/accuracy.md
 #   make wheel   build dist/*.whl
 #   make clean   remove what was built, the virtual environment too
 
@@ -13,7 +14,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lint docs tables accuracy wheel clean
+.PHONY: demo test lint docs tables accuracy error-check wheel clean
 
 PYTHON ?= python3
 BIN := .venv/bin
@@ -50,6 +51,9 @@ docs: .venv/.ready
 
 accuracy: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.accuracy docs/accuracy.md
+
+error-check: .venv/.ready-reference
+	$(BIN)/python -m defshade_cli.measure.convergence docs/accuracy.md
 
 tables: .venv/.ready
 	$(BIN)/python -m defshade_cli.measure.layouts docs/lighting.md
