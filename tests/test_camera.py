@@ -191,9 +191,14 @@ def test_an_aperture_without_area_sees_nothing() -> None:
         camera("float horizontalAperture = 0")
 
 
-def test_clipping_planes_are_reported() -> None:
+def test_clipping_planes_are_read_as_many_as_a_driver_has() -> None:
     scene = read('def Camera "cam" {\nfloat4[] clippingPlanes = [(1, 0, 0, 0)]\n}')
-    assert reasons(scene, "/cam") == ["clippingPlanes are ignored"]
+    assert scene.unsupported == ()
+    np.testing.assert_array_equal(scene.camera.clipping_planes, [(1, 0, 0, 0)])
+    nine = ", ".join(f"(1, 0, 0, {n})" for n in range(9))
+    crowded = read(f'def Camera "cam" {{\nfloat4[] clippingPlanes = [(nan, 0, 0, 0), {nine}]\n}}')
+    assert len(crowded.camera.clipping_planes) == 8
+    assert reasons(crowded, "/cam") == ["2 of its 10 clippingPlanes are left out"]
 
 
 # The camera that frames

@@ -192,7 +192,7 @@ def test_the_command_line(tmp_path: Path, scenes: Path) -> None:
     arguments = [stage, "-o", str(tmp_path / "a.exr"), "--size", "64x36", "--stats", str(stats), "--max-error", "0.3"]
     done = CliRunner().invoke(render, [*arguments, "--layers", "beauty,variance,sampleCount"])
     assert done.exit_code == 0, done.output
-    film = json.loads(stats.read_text())["frames"][0]["film"]
+    film = json.loads(stats.read_text())["frames"][0]["images"][0]["film"]
     assert film["stopped_by"] == "max-error"
     assert film["error"] <= 0.3
     assert film["samples_min"] <= film["samples_mean"] <= film["samples"] < MOST_SAMPLES

@@ -170,7 +170,7 @@ def test_subsets_draw_their_own_triangles(pipeline: Pipeline) -> None:
 
 
 def test_instances_bear_their_own_colour_and_vertices_theirs(pipeline: Pipeline) -> None:
-    shown = Material("/shown", uses_display_color=True)
+    shown = Material("/shown", uses_display_color=True, uses_display_opacity=True)
     varying = replace(quad(0.4), display_color=np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], np.float32))
     left, right = translation(np.array([-1.0, 0, 0])), translation(np.array([1.0, 0, 0]))
     constant = replace(drawable(quad(0.4), 0, where=[left]), display_color=np.array([[0.2, 0.4, 0.6]], np.float32))
@@ -180,3 +180,17 @@ def test_instances_bear_their_own_colour_and_vertices_theirs(pipeline: Pipeline)
     centre = albedo[31:33, 44:46].mean((0, 1))  # on the diagonal red–blue
     np.testing.assert_allclose(centre.sum(), 1.0, atol=0.15)
     assert albedo[27, 40].min() > 0.8  # the upper left corner is white
+
+
+def test_clipping_planes_cut_in_camera_space(gpu: Gpu) -> None:
+    """What is right of x = 1 and below y = 0.5 for a camera behind the quad, whose x is the world's −x."""
+    view = replace(camera(), clipping_planes=np.array([(-1.0, 0.0, 0.0, 1.0), (0.0, 2.0, 0.0, -1.0)]))
+    turned = replace(view, world_from_camera=rotated("y", 180.0) @ view.world_from_camera)
+    behind = scene([quad(half=10.0)], [sun()], view=turned)
+    plan = make_plan(behind, RenderSettings(size=(40, 40), layers=("depth", "position")))
+    layers = Pipeline(gpu).render(behind, plan).layers
+    seen = np.isfinite(layers["depth"][..., 0])
+    x, y = layers["position"][..., 0][seen], layers["position"][..., 1][seen]
+    assert (-x <= 1.0).all() and (y >= 0.5).all()
+    # The image is 5 units wide and high: 3.5 and 2 of them are left.
+    assert seen.sum() == 28 * 16

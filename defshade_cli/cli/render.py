@@ -15,7 +15,7 @@ from defshade_cli.cli.stats import Stats
 from defshade_cli.settings import RenderJob
 
 if TYPE_CHECKING:
-    from defshade_cli.render import FrameResult
+    from defshade_cli.rendering import FrameResult
 
 log = logging.getLogger("defshade")
 
@@ -41,7 +41,7 @@ def render(job: RenderJob, reporting: Reporting) -> None:
 
 def execute(job: RenderJob, reporting: Reporting) -> None:
     """Render `job`, telling of it as `reporting` says."""
-    from defshade_cli.render import run
+    from defshade_cli.rendering import run
 
     start_logging(reporting)
     frames = max(1, len(job.frames))
@@ -56,5 +56,5 @@ def execute(job: RenderJob, reporting: Reporting) -> None:
 
 def _log_details(result: FrameResult) -> None:
     log.info("frame %s: %s", frame_name(result.frame), ", ".join(f"{k} {v:.3f} s" for k, v in result.seconds.items()))
-    for decision in result.plan.decisions if result.plan else ():
+    for decision in (decision for image in result.images if image.plan for decision in image.plan.decisions):
         log.info("%s: %s, %s", decision.subject, decision.choice, decision.reason)

@@ -2,29 +2,60 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import logging
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.gpu.planes import MOST_PRIMVARS
 from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.material import UV_SETS, Material
+
+log = logging.getLogger("defshade")
 
 UvNames = tuple[str, ...]
 
 
 def uv_names(drawables: Sequence[Drawable], materials: Sequence[Material], count: int) -> tuple[UvNames, ...]:
-    """For each of `count` meshes the primvars that fill its sets, as the first of its materials wants them."""
-    names: list[UvNames] = [()] * count
+    """For each of `count` meshes the primvars that its materials read, each once."""
+    names: list[dict[str, None]] = [{} for _ in range(count)]
     for drawable in drawables:
         for subset in drawable.subsets:
-            wanted = materials[subset.material].uv_names[:UV_SETS]
-            names[drawable.mesh] += wanted[len(names[drawable.mesh]) :]
-    return tuple(names)
+            names[drawable.mesh].update(dict.fromkeys(materials[subset.material].uv_names[:UV_SETS]))
+    return tuple(tuple(found) for found in names)
+
+
+def uv_slots(names: Sequence[UvNames]) -> dict[str, int]:
+    """Which set each primvar fills, the same on all meshes: another one than those that share a mesh with it.
+
+    One for which no set is left is missing; what reads it keeps its constant.
+    """
+    slots: dict[str, int] = {}
+    for name in dict.fromkeys(name for found in names for name in found):
+        beside = {other for found in names if name in found for other in found}
+        free = set(range(UV_SETS)) - {slots[other] for other in beside if other in slots}
+        if free:
+            slots[name] = min(free)
+        else:
+            log.warning("texture coordinates %s are not read: a mesh holds %d sets", name, UV_SETS)
+    return slots
+
+
+def in_slots(names: UvNames, slots: Mapping[str, int]) -> UvNames:
+    """What fills each set of a mesh; empty for nothing."""
+    filled = {slots[name]: name for name in names if name in slots}
+    return tuple(filled.get(slot, "") for slot in range(UV_SETS))
 
 
 def vertex_arrays(
-    meshes: Sequence[Mesh], uvs: Sequence[UvNames], *, color_varies: bool, textured: bool, layer_uv: bool = False
+    meshes: Sequence[Mesh],
+    uvs: Sequence[UvNames],
+    *,
+    color_varies: bool,
+    textured: bool,
+    layer_uv: bool = False,
+    primvars: Sequence[str] = (),
 ) -> list[NDArray]:
     """Positions, normals and indices; colours a vertex and texture coordinates where they are asked for."""
     arrays = [
@@ -38,6 +69,8 @@ def vertex_arrays(
         arrays.append(_joined([_vertex_uvs(m, names) for m, names in zip(meshes, uvs, strict=True)], 2 * UV_SETS))
     if layer_uv:
         arrays.append(_joined([_layer_uvs(m) for m in meshes], 2))
+    if primvars:
+        arrays.append(_joined([_vertex_primvars(m, primvars) for m in meshes], 4 * MOST_PRIMVARS))
     return arrays
 
 
@@ -69,3 +102,13 @@ def _layer_uvs(mesh: Mesh) -> NDArray[np.float32]:
     """(V, 2) the primvar st, else the first set that there is, else 0."""
     sets = [mesh.uvs[name] for name in ("st", *mesh.uvs) if name in mesh.uvs]
     return sets[0] if sets else np.zeros((len(mesh.points), 2), np.float32)
+
+
+def _vertex_primvars(mesh: Mesh, names: Sequence[str]) -> NDArray[np.float32]:
+    """(V, 16) four numbers of each primvar one after another, 0 for what the mesh lacks."""
+    values = np.zeros((len(mesh.points), 4 * MOST_PRIMVARS), np.float32)
+    for number, name in enumerate(names):
+        if name in mesh.primvars:
+            width = mesh.primvars[name].shape[1]
+            values[:, 4 * number : 4 * number + width] = mesh.primvars[name]
+    return values

@@ -33,6 +33,7 @@ from defshade_cli.plan import Plan, PlannedLight, Volume
 from defshade_cli.scene.emission import Emitter
 from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import Light, Profile, Shaping
+from defshade_cli.scene.shadow import ShadowStyle
 from defshade_cli.settings import Layout, Shading
 
 _PROFILES: tuple[Profile, ...] = ("uniform", "cosine", "sine")
@@ -52,6 +53,7 @@ class LightingVariant:
     shading: Shading
     orthographic: bool
     shadows: bool
+    shadow_styles: bool
     ies: bool
     volumes: tuple[Volume, ...]
     outputs: tuple[str, ...] = ()
@@ -67,6 +69,7 @@ class LightingVariant:
             plan.shading,
             orthographic,
             plan.shadows,
+            plan.shadow_styles,
             bool(plan.profiles),
             plan.volumes,
             plan.outputs,
@@ -77,7 +80,12 @@ class LightingVariant:
     @property
     def defines(self) -> list[str]:
         flags = ["CLASSIC"] * (self.shading == "classic") + ["ORTHOGRAPHIC"] * self.orthographic
-        flags += ["SHADOWS"] * self.shadows + ["IES"] * self.ies + space_defines(self.space)
+        flags += (
+            ["SHADOWS"] * self.shadows
+            + ["SHADOW_STYLES"] * self.shadow_styles
+            + ["IES"] * self.ies
+            + space_defines(self.space)
+        )
         return [plane.define for plane in self.planes] + flags + output_defines(self.outputs)
 
 
@@ -171,6 +179,7 @@ def light_records(
         row["is_sky"] = planned.light.kind == "dome"
         _set_shaping(row, planned.light.shaping)
         _set_profile(row, planned.light, tables.profiles)
+        _set_shadow(row, planned.light.shadow)
         row["first_link"] = tables.links.lights.get(planned.light, ALL_LINKED)
     if shadows:
         records["first_shadow"], records["shadow_count"] = shadows.first, shadows.count
@@ -184,6 +193,11 @@ def _set_shaping(row: np.void, shaping: Shaping | None) -> None:
     angle, softness = math.radians(shaping.cone_angle), min(max(shaping.cone_softness, 0.0), 1.0)
     row["cone_angle"], row["cone_smooth_start"] = angle, angle * (1.0 - softness)
     row["focus"], row["focus_tint"] = shaping.focus, shaping.focus_tint
+
+
+def _set_shadow(row: np.void, shadow: ShadowStyle) -> None:
+    row["shadow_color"], row["shadow_distance"] = shadow.color, shadow.distance
+    row["shadow_fading"], row["shadow_gamma"] = shadow.fading, shadow.gamma
 
 
 def _set_profile(row: np.void, light: Light, profiles: Sequence[IesProfile]) -> None:

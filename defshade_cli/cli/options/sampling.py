@@ -54,4 +54,10 @@ def sampling_options() -> list[Function]:
             default_text=_WIDTHS,
             help="Width of the filter, from end to end.",
         ),
+        option(
+            "--motion-blur/--no-motion-blur",
+            default=_RENDER.motion_blur,
+            default_text="--motion-blur",
+            help="Whether several samples see the stage at as many times while the camera's shutter is open.",
+        ),
     ]
