@@ -59,13 +59,27 @@ class Pipeline:
         self._accumulation = AccumulationPass(gpu, self._frame, self._screen)
         self._stopping = Stopping(gpu, self._frame, self._screen, self._mask)
 
-    def render(self, scene: Scene, plan: Plan, moments: Iterator[ShutterSample] | None = None) -> Film:
+    def upload(self, scene: Scene, plan: Plan) -> DrawList:
+        """The scene on the GPU, when all of it has arrived. Raises GpuError."""
+        self._gpu.make_current()
+        draws = self._resident(scene, plan)
+        self._gpu.context.finish()
+        return draws
+
+    def render(
+        self,
+        scene: Scene,
+        plan: Plan,
+        moments: Iterator[ShutterSample] | None = None,
+        uploaded: DrawList | None = None,
+    ) -> Film:
         """The plan's layers. Raises GpuError.
 
         moments: what samples see in turn, where the plan has motion blur; data layers show the scene itself.
+        uploaded: of this scene, where that has been done before.
         """
         self._gpu.make_current()
-        draws = self._resident(scene, plan)
+        draws = uploaded or self._resident(scene, plan)
         layers: Layers = {}
         manifests: Manifests = {}
         sampling = Sampling(1, 1.0, 1)
@@ -118,6 +132,7 @@ class Pipeline:
             if moments and plan.moments and sample.index % plan.samples_a_moment == 0:
                 scene, plan = next(moments)
                 draws, tables = self._scene.update(scene, plan.inputs), self._tables.update(plan)
+                mattes.see(scene)
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             if plan.mattes:
                 mattes.add(gbuffer.target.read("visible"))
