@@ -151,10 +151,12 @@ def tessellate(surface: Surface, refiner: Refiner | None = None, last: Gprim | N
     return Gprim(mesh, made.groups, tuple(Unsupported(surface.path, issue) for issue in made.issues), made)
 
 
-def move_surface(surface: Surface, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
-    """The same with the points of another time; None where they do not fit what stays."""
+def move_surface(
+    surface: Surface, prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode | None = None
+) -> Surface | None:
+    """The same with the points of another time, as read_positions has them; None where they do not fit what stays."""
     polygons = surface.polygons
-    points = read_positions(prim, time)
+    points = read_positions(prim, time, base)
     if points is None or points.shape != polygons.points.shape or not np.isfinite(points[polygons.indices]).all():
         return None
     return replace(surface, polygons=replace(polygons, points=points))

@@ -12,6 +12,7 @@ from defshade_cli.usd.binding import NOTHING_ABOVE, Bindings, Bound, read_bound
 from defshade_cli.usd.geometry import Surface, is_time_varying, move_surface, only_points_vary, read_surface
 from defshade_cli.usd.kind import Kinds
 from defshade_cli.usd.material import ReadMaterial, read_material
+from defshade_cli.usd.positions import is_carried_by_velocities
 from defshade_cli.usd.primvars import DISPLAY_COLOR
 from defshade_cli.usd.shapes import Shapes
 from defshade_cli.usd.sharing import shared
@@ -39,6 +40,16 @@ class Memory:
         self._first_instances: dict[str, str] = {}
         self._models = draw_mode.StandIns()
         self._stand_ins: dict[tuple[Sdf.Path, str], Surface] = {}
+
+    def surface_around(self, prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode) -> Surface | None:
+        """The surface at a time near `base`, a frame. A mesh that velocities carry has what it has at the frame.
+
+        So its points keep their number while the shutter is open, whatever samples lie within.
+        """
+        if time == base or not prim.IsA(UsdGeom.Mesh) or not is_carried_by_velocities(prim, time):
+            return self.surface(prim, time)
+        rest = self.surface(prim, base)
+        return (move_surface(rest, prim, time, base) if rest and rest.groups else None) or rest
 
     def surface(self, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
         """The same object at every time, unless something of the prim varies."""

@@ -129,7 +129,8 @@ class StageReader:
 
     def _read(self, frame: float | None, time: Usd.TimeCode, levels: dict[str, int]) -> Scene:
         """levels: of refinement by path of the surface; those that are missing are chosen, and put in."""
-        traversal = Traversal(self._stage, self._memory, time, self._purposes)
+        base = time if frame is None else Usd.TimeCode(frame)
+        traversal = Traversal(self._stage, self._memory, time, self._purposes, base)
         pieces = traversal.read_stage()
         placed = tuple(_surfaces(pieces, self._purposes))
         drawn = tuple((piece, surface) for piece, surface in placed if surface.groups)
