@@ -85,6 +85,7 @@ class RenderSettings:
         None follows the stage's RenderSettings, then the whole image.
     samples: jittered samples a pixel; 1 is a sample at the pixel's centre.
     cryptomatte_levels: ids a pixel of a Cryptomatte holds, the greatest coverage first; even.
+    light_points: places on a light, in all samples together at least, where it looks large; 1 is its far field.
     filter: the samples of a pixel fall by it.  filter_width: pixels from end to end; None for the filter's own.
     render_space: the scene-linear colour space of the image, by a name that the OCIO config knows; None follows the
         stage's RenderSettings, then linear Rec.709.  ocio: the config, a file or ocio://NAME; empty for $OCIO's.
@@ -99,6 +100,7 @@ class RenderSettings:
     width: int | None = None
     crop: tuple[int, int, int, int] | None = None
     samples: int = 1
+    light_points: int = 16
     filter: Filter = "box"
     filter_width: float | None = None
     cryptomatte_levels: int = 6

@@ -57,11 +57,12 @@ def _emitters(number: int, planned: PlannedLight, plan: Plan, sample: Sample, ex
             return []
         places = (sample.on_light(number, k, DOME_DIRECTIONS) for k in range(DOME_DIRECTIONS))
         return [sky_emitter(light, sky_of(light), u[:2], 1.0 / DOME_DIRECTIONS) for u in places]
-    if plan.samples == 1:
+    if plan.samples * planned.points == 1:
         return [far_field(light)]
     towards = extent.receivers.mean(axis=0) + plan.camera.position
-    emitter = emitter_at(light, sample.on_light(number), towards, inside=planned.is_empty)
-    return [emitter.shared_by(plan.samples)]
+    places = (sample.on_light(number, k, planned.points) for k in range(planned.points))
+    points = [emitter_at(light, u, towards, inside=planned.is_empty) for u in places]
+    return [point.one_of(planned.points).shared_by(plan.samples) for point in points]
 
 
 def shadow_extent(bounds: NDArray[np.float64], plan: Plan) -> ShadowExtent:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.image.light_texture import with_texture
 from defshade_cli.plan.overlap import reaches_into_ball
+from defshade_cli.plan.points import apparent_size, share_points
 from defshade_cli.scene.light import DistantLight, Light, SphereLight
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
@@ -37,6 +38,7 @@ class PlannedLight:
 
     reach: radius of the volume in scene units, infinite for a quad.
     is_empty: no geometry lies within a sphere light.
+    points: that stand for the light in each sample; 1 is its far field where there is a single sample.
     """
 
     light: Light
@@ -44,6 +46,7 @@ class PlannedLight:
     reach: float
     number: int = 0
     is_empty: bool = True
+    points: int = 1
 
 
 def volume_of(light: Light) -> Volume:
@@ -59,9 +62,10 @@ def plan_lights(scene: Scene, exposure: float, settings: RenderSettings) -> tupl
     response = max((_greatest_response(m, settings.shading) for m in scene.materials), default=1.0)
     gain = exposure * response * max(len(lit), 1) / settings.light_tolerance
     order: dict[str, int] = {"quad": 0, "sphere": 1, "cone": 2}
+    points = share_points([apparent_size(light, scene.bounds) for _, light in lit], settings)
     planned = [
-        PlannedLight(light, volume_of(light), _reach(light, scene.bounds, gain), number, _is_empty(light, scene))
-        for number, light in lit
+        PlannedLight(light, volume_of(light), _reach(light, scene.bounds, gain), number, _is_empty(light, scene), count)
+        for (number, light), count in zip(lit, points, strict=True)
     ]
     return tuple(sorted(planned, key=lambda p: order[p.volume]))
 

@@ -58,6 +58,10 @@ class Emitter:
         """One of `samples` points that stand for the light together."""
         return replace(self, extent=self.extent / samples)
 
+    def one_of(self, points: int) -> Emitter:
+        """One of `points` that shine in the same sample."""
+        return replace(self, intensity=self.intensity / points, extent=self.extent / points)
+
     def relative_to(self, origin: Vector) -> Emitter:
         """The same with positions counted from `origin`."""
         return replace(self, position=self.position - origin)
