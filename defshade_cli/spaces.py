@@ -56,6 +56,13 @@ def rigid(matrix: Matrix) -> Matrix:
     return result
 
 
+def cofactors(matrix: NDArray) -> NDArray[np.float64]:
+    """det(M) M⁻ᵀ, with the sign that keeps outward normals outward under a mirror."""
+    x, y, z = matrix.T
+    areas = np.column_stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])
+    return areas * (-1.0 if np.dot(x, areas[:, 0]) < 0 else 1.0)
+
+
 def inverse_rigid(b_from_a: Matrix) -> Matrix:
     """a_from_b of a rotation with a translation, exactly: the transpose, not a solver."""
     inverse = np.eye(4)

@@ -2,6 +2,7 @@
 #include "lib/surface.glsl"
 #include "lib/environment.glsl"
 #include "generated/planes.glsl"
+#include "generated/outputs.glsl"
 #ifdef PLANE_LINKS
 #include "lib/linking.glsl"
 
@@ -9,7 +10,6 @@ uniform uint first_link;
 #endif
 
 uniform vec2 response;             // of the diffuse and of the specular lobe
-out vec4 radiance;
 
 // The part of a lobe that this pass shows: all of it in a single sample, else what sampled directions would miss.
 float share(float roughness) {
@@ -25,22 +25,25 @@ vec3 mirrored_sky(vec3 n, vec3 v, float roughness) {
     return share(roughness) * response.y * sky_radiance(reflect(-v, n), lobe_lod(GGX_alpha(roughness)));
 }
 
-vec3 reflected_sky(Surface s, vec3 v) {
+// The sky's light on a surface: all of it, and the diffuse lobe's part.
+vec3 reflected_sky(Surface s, vec3 v, out vec3 diffuse) {
+    diffuse = vec3(0.0);
 #ifdef PLANE_LINKS
     if (!is_linked(first_link, s.link_set)) return vec3(0.0);
 #endif
     float NoV = max(dot(s.normal, v), MIN_NOV);
     vec3 albedo = E_bound(s.f0, s.f90, NoV, GGX_alpha(s.roughness), SMITH_GGX);
-    vec3 result = albedo * mirrored_sky(s.normal, v, s.roughness);
+    vec3 specular = albedo * mirrored_sky(s.normal, v, s.roughness);
 #ifdef ANALYTIC
-    result += s.base * ((1.0 - s.metallic) / PI) * (1.0 - albedo) * response.x * sky_irradiance(s.normal);
+    diffuse = s.base * ((1.0 - s.metallic) / PI) * (1.0 - albedo) * response.x * sky_irradiance(s.normal);
 #endif
 #ifdef PLANE_CLEARCOAT
     float coat_alpha = GGX_alpha(s.clearcoat_roughness);
     float coat = s.clearcoat * E_bound(vec3(DEFAULT_F0), vec3(1.0), NoV, coat_alpha, SMITH_GGX).x;
-    result = result * (1.0 - coat) + coat * mirrored_sky(s.normal, v, s.clearcoat_roughness);
+    diffuse *= 1.0 - coat;
+    specular = specular * (1.0 - coat) + coat * mirrored_sky(s.normal, v, s.clearcoat_roughness);
 #endif
-    return result;
+    return diffuse + specular;
 }
 
 void main() {
@@ -49,9 +52,18 @@ void main() {
     bool covered = stored != BACKGROUND_DEPTH;
     vec3 position = position_at(gl_FragCoord.xy, covered ? camera_depth(stored) : 1.0);
     vec3 v = direction_to_eye(position);
-    radiance = vec4(0.0);
+    float alpha = 0.0;
+    Lit lit = Lit(vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0);
 #ifdef BACKGROUND
-    if (!covered) radiance = vec4(view.exposure * sky_radiance(-v, 0.0), 1.0);
+    if (!covered) {
+        lit.radiance = view.exposure * sky_radiance(-v, 0.0);
+        alpha = 1.0;
+    }
 #endif
-    if (covered) radiance.rgb = view.exposure * reflected_sky(read_planes(pixel), v);
+    if (covered) lit.radiance = view.exposure * reflected_sky(read_planes(pixel), v, lit.diffuse);
+#ifdef SPLIT
+    lit.diffuse *= view.exposure;
+#endif
+    write_light(lit);
+    radiance.a = alpha;
 }

@@ -7,6 +7,7 @@
 #endif
 #include "lib/render_space.glsl"
 #include "generated/planes.glsl"
+#include "generated/outputs.glsl"
 
 // A lobe that is wider by the patch of light that one point stands for.
 float widened_roughness(float roughness, float alpha_squared) {
@@ -15,7 +16,6 @@ float widened_roughness(float roughness, float alpha_squared) {
 }
 
 flat in uint light_index;
-out vec4 radiance;
 
 // What of each lobe a light may show: the environment pass shows a dome in the sharp ones.
 vec3 lobe_response(Light light, Surface s) {
@@ -35,17 +35,32 @@ void main() {
     vec3 position = position_at(gl_FragCoord.xy, camera_depth(stored));
     vec3 l;
     vec3 irradiance = irradiance_from(lights[light_index], position, l);
-    if (irradiance == vec3(0.0)) discard;
+    if (irradiance == vec3(0.0)) {
+        write_nothing();
+        return;
+    }
     Surface surface = read_planes(pixel);
 #ifdef PLANE_LINKS
-    if (!is_linked(lights[light_index].first_link, surface.link_set)) discard;
+    if (!is_linked(lights[light_index].first_link, surface.link_set)) {
+        write_nothing();
+        return;
+    }
 #endif
-    irradiance *= visibility(lights[light_index], position, l);
+    Lit lit;
+    lit.sent = dot(irradiance, vec3(1.0)) * max(dot(surface.normal, l), 0.0);
+    lit.volumes = 1.0;
+    lit.visible = visibility(lights[light_index], position, l);
+    irradiance *= lit.visible;
     float widening = patch_alpha_squared(lights[light_index], position, l);
     if (widening > 0.0) {
         surface.roughness = widened_roughness(surface.roughness, widening);
         surface.clearcoat_roughness = widened_roughness(surface.clearcoat_roughness, widening);
     }
-    vec3 f = evaluate_brdf(surface, direction_to_eye(position), l, lobe_response(lights[light_index], surface));
-    radiance = vec4(view.exposure * render_from_rec709(irradiance) * f, 0.0);
+    vec3 v = direction_to_eye(position), response = lobe_response(lights[light_index], surface);
+    vec3 arriving = view.exposure * render_from_rec709(irradiance);
+    lit.radiance = arriving * evaluate_brdf(surface, v, l, response);
+#ifdef SPLIT
+    lit.diffuse = arriving * evaluate_brdf(surface, v, l, vec3(response.x, 0.0, 0.0));
+#endif
+    write_light(lit);
 }

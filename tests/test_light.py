@@ -11,8 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pxr import Usd, UsdLux
 
+from defshade_cli.plan import make_plan
 from defshade_cli.scene.light import CylinderLight, DiskLight, DistantLight, Light, RectLight, Shaping, SphereLight
 from defshade_cli.scene.scene import Scene
+from defshade_cli.settings import RenderSettings
 from defshade_cli.usd.light import CAMERA_LIGHT, temperature_color
 from defshade_cli.usd.reader import StageReader
 from stages import reasons, stage_of
@@ -190,17 +192,18 @@ def test_invisible_lights_are_off_and_purposes_do_not_matter() -> None:
 # What is left out
 
 
-@pytest.mark.parametrize("kind", ["GeometryLight", "PortalLight", "PluginLight"])
-def test_other_kinds_are_reported(kind: str) -> None:
-    scene = read(f'def {kind} "light" {{\n}}\ndef SphereLight "bulb" {{\n}}')
+def test_other_kinds_are_reported() -> None:
+    scene = read('def PluginLight "light" {\n}\ndef SphereLight "bulb" {\n}')
     assert [found.path for found in scene.lights] == ["/bulb"]
-    assert reasons(scene, "/light") == [f"lights of type {kind} are not supported yet"]
+    assert reasons(scene, "/light") == ["lights of type PluginLight are not supported yet"]
 
 
-def test_a_mesh_light_is_reported_and_its_mesh_drawn() -> None:
-    scene = read('def Sphere "lamp" (prepend apiSchemas = ["MeshLightAPI"]) {\n}')
-    assert reasons(scene, "/lamp") == ["lights of type Sphere are not supported yet"]
-    assert [drawable.paths for drawable in scene.drawables] == [("/cube",), ("/lamp",)]
+def test_portals_are_hints() -> None:
+    scene = read('def DomeLight "sky" {\ndef PortalLight "window" {\n}\n}')
+    assert ([found.path for found in scene.lights], scene.portals) == (["/sky"], ("/sky/window",))
+    assert reasons(scene, "/sky/window") == []
+    plan = make_plan(scene, RenderSettings())
+    assert [d.choice for d in plan.decisions if d.subject == "portals"] == ["passed over"]
 
 
 @pytest.mark.parametrize(

@@ -63,7 +63,7 @@ def test_the_top_left_stands_at_plus_x_and_plus_y() -> None:
     """The schema: a texture's min coordinates are at (+X, +Y); so it is upright to what it lights."""
     image = np.zeros((2, 2, 3), np.float32)
     image[0, 0] = 4
-    emitter = emitter_at(panel(radiance_map=RadianceMap(image)), (0.5, 0.5))
+    emitter = emitter_at(panel(radiance_map=RadianceMap(image)), (0.5, 0.5, 0.5), np.zeros(3))
     np.testing.assert_allclose(emitter.position, [0.5, 0.25, 0])
     np.testing.assert_allclose(emitter.intensity, 2.0, err_msg="the mean, 1, times the area: all light is in one place")
 

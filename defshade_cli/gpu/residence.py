@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 import moderngl
@@ -20,6 +21,9 @@ from defshade_cli.scene.scene import Scene
 
 VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS, TEXTURE_INPUTS, TILES, LINKS = range(8)
 """Binding points of the storage buffers, as the shaders declare them."""
+
+INDICES_IN_POOL = 2
+"""Which of the vertex arrays has a row a triangle; the others have one a vertex."""
 
 _COMMAND = np.dtype([(name, "u4") for name in ("count", "instances", "first_index", "base_vertex", "base_instance")])
 
@@ -82,7 +86,7 @@ class GpuScene:
         self._texture_inputs = RecordBuffer(gpu, TEXTURE_INPUTS)
         self._tiles = RecordBuffer(gpu, TILES)
         self._textures = TextureStore(gpu)
-        self._meshes: tuple[Mesh, ...] | None = None
+        self._meshes: tuple[Mesh, ...] = ()
         self._made_for: tuple = ()
         self._pool: list[moderngl.Buffer] = []
         self._draws: list[moderngl.Buffer] = []
@@ -99,10 +103,12 @@ class GpuScene:
         textured = bool(textures.arrays)
         uvs = uv_names(scene.drawables, scene.materials, len(scene.meshes)) if textured else ()
         made_for = (uvs, color_varies, textured, layer_uv)
-        if self._meshes is None or not _same(self._meshes, scene.meshes) or made_for != self._made_for:
-            arrays = vertex_arrays(scene.meshes, uvs, color_varies=color_varies, textured=textured, layer_uv=layer_uv)
-            self._pool = self._replaced(self._pool, arrays)
-            self._meshes, self._made_for = scene.meshes, made_for
+        arrays_of = partial(vertex_arrays, color_varies=color_varies, textured=textured, layer_uv=layer_uv)
+        if made_for == self._made_for and _are_alike(self._meshes, scene.meshes):
+            self._overwrite(scene.meshes, lambda number: arrays_of([scene.meshes[number]], uvs[number : number + 1]))
+        else:
+            self._pool = self._replaced(self._pool, arrays_of(scene.meshes, uvs))
+        self._meshes, self._made_for = scene.meshes, made_for
         commands, rows = draw_commands(scene.drawables, scene.meshes)
         numbers = [np.arange(len(rows), dtype=np.uint32)] * ("DRAW_ROW" in inputs)
         self._draws = self._replaced(self._draws, [commands, rows, *numbers])
@@ -126,6 +132,15 @@ class GpuScene:
             self._texture_inputs.write(inputs)
             self._tiles.write(textures.tiles)
         return textures
+
+    def _overwrite(self, meshes: tuple[Mesh, ...], arrays_of: Callable[[int], Sequence[NDArray]]) -> None:
+        """Upload the meshes that are not the same as before, each to its place in the pool."""
+        firsts = _first_rows(meshes)
+        for number, (old, new) in enumerate(zip(self._meshes, meshes, strict=True)):
+            if old is not new:
+                for kind, (buffer, array) in enumerate(zip(self._pool, arrays_of(number), strict=True)):
+                    row = firsts[number, 1 if kind == INDICES_IN_POOL else 0]
+                    buffer.write(np.ascontiguousarray(array), offset=int(row) * array[:1].nbytes)
 
     def _replaced(self, old: list[moderngl.Buffer], arrays: Sequence[NDArray]) -> list[moderngl.Buffer]:
         for buffer in old:
@@ -176,8 +191,7 @@ def material_records(materials: Sequence[Material], input_counts: Sequence[int])
 
 def draw_commands(drawables: Sequence[Drawable], meshes: Sequence[Mesh]) -> tuple[NDArray, NDArray[np.uint32]]:
     """Indirect commands, one a subset, and the (instance, material) rows that their base instances point into."""
-    base_vertex = np.cumsum([0, *(len(m.points) for m in meshes)])
-    base_index = np.cumsum([0, *(3 * len(m.triangles) for m in meshes)])
+    base_vertex, base_index = (_first_rows(meshes) * (1, 3)).T
     commands, rows, first_instance, first_row = [], [], 0, 0
     for drawable in drawables:
         count = len(drawable.world_from_object)
@@ -198,5 +212,12 @@ def command_corners(scene: Scene) -> NDArray[np.float64]:
     return np.repeat(np.array(boxes).reshape(-1, 8, 3), counts, axis=0)
 
 
-def _same(old: tuple[Mesh, ...], new: tuple[Mesh, ...]) -> bool:
-    return len(old) == len(new) and all(a is b for a, b in zip(old, new, strict=True))
+def _first_rows(meshes: Sequence[Mesh]) -> NDArray[np.int64]:
+    """(M + 1, 2) vertices and triangles before each mesh, and all of them."""
+    sizes = [(len(mesh.points), len(mesh.triangles)) for mesh in meshes]
+    return np.cumsum([(0, 0), *sizes], axis=0, dtype=np.int64)
+
+
+def _are_alike(old: tuple[Mesh, ...], new: tuple[Mesh, ...]) -> bool:
+    """Do the meshes take the same places in the pool?"""
+    return bool(old) and np.array_equal(_first_rows(old), _first_rows(new))

@@ -21,7 +21,7 @@ from pathlib import Path
 from defshade_cli.errors import OutputError
 from defshade_cli.image.encoders import EXR, encode, suffix_of
 from defshade_cli.image.film import Film
-from defshade_cli.image.layers import BEAUTY, in_order
+from defshade_cli.image.layers import BEAUTY, LAYERS, in_order
 from defshade_cli.image.verification import verify
 from defshade_cli.settings import OutputSettings
 
@@ -31,7 +31,7 @@ def targets(layers: Iterable[str], output: OutputSettings, path: Path) -> dict[P
     names = in_order(layers)
     if not output.split_layers and (suffix_of(path) == EXR or len(names) == 1):
         return {path: names}
-    beside = {name: path.with_name(f"{path.stem}.{name}{path.suffix}") for name in names}
+    beside = {name: path.with_name(f"{path.stem}.{LAYERS[name].exr_name}{path.suffix}") for name in names}
     if not output.split_layers and BEAUTY in beside:
         beside[BEAUTY] = path
     return {file: (name,) for name, file in beside.items()}

@@ -16,6 +16,7 @@ from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.emission import Emitter, emitter_at, far_field, sky_emitter
 from defshade_cli.scene.light import DomeLight
+from defshade_cli.scene.mesh_light import MeshLight
 from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import Window
 
@@ -60,7 +61,7 @@ def _emitters(number: int, planned: PlannedLight, plan: Plan, sample: Sample, ex
     if plan.samples * planned.points == 1:
         return [far_field(light)]
     towards = extent.receivers.mean(axis=0) + plan.camera.position
-    places = (sample.on_light(number, k, planned.points) for k in range(planned.points))
+    places = [sample.on_light(number, k, planned.points) for k in range(planned.points)]
     points = [emitter_at(light, u, towards, inside=planned.is_empty) for u in places]
     return [point.one_of(planned.points).shared_by(plan.samples) for point in points]
 
@@ -91,7 +92,8 @@ def _corners(box: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _lit_sample(planned: PlannedLight, emitter: Emitter, plan: Plan, extent: ShadowExtent) -> LitSample:
     light = planned.light
-    if not (plan.shadows and light.casts_shadow):
+    within_itself = isinstance(light, MeshLight) and plan.samples * planned.points == 1  # its far field shines from amid its own surface
+    if not (plan.shadows and light.casts_shadow) or within_itself:
         return LitSample(planned, emitter, ())
     relative = emitter.relative_to(plan.camera.position)
     cameras = shadow_cameras(relative, light.shaping, extent, distant=light.is_infinite)

@@ -12,14 +12,15 @@ import moderngl
 import numpy as np
 
 from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.outputs import output_defines, outputs_source
 from defshade_cli.gpu.planes import Plane, read_source
 from defshade_cli.gpu.render_space import space_defines
-from defshade_cli.gpu.targets import Target
 from defshade_cli.image.environment import sky_of
 from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.gbuffer import GBuffer
+from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.linking import ALL_LINKED
-from defshade_cli.plan import Plan
+from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.scene.environment import Environment
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.settings import Layout
@@ -37,17 +38,22 @@ class EnvironmentVariant:
     orthographic: bool
     analytic: bool
     background: bool
+    outputs: tuple[str, ...] = ()
+    groups: int = 0
     space: RenderSpace = REC709
 
     @classmethod
     def of(cls, plan: Plan) -> EnvironmentVariant:
         orthographic = plan.camera.projection == "orthographic"
-        return cls(plan.planes, plan.layout, orthographic, plan.samples == 1, plan.background, plan.render_space)
+        shows = plan.samples == 1, plan.background
+        return cls(plan.planes, plan.layout, orthographic, *shows, plan.outputs, plan.most_groups, plan.render_space)
 
     @property
     def defines(self) -> list[str]:
         flags = ["ORTHOGRAPHIC"] * self.orthographic + ["ANALYTIC"] * self.analytic + ["BACKGROUND"] * self.background
-        return [plane.define for plane in self.planes] + flags + space_defines(self.space)
+        return (
+            [plane.define for plane in self.planes] + flags + space_defines(self.space) + output_defines(self.outputs)
+        )
 
 
 class EnvironmentPass:
@@ -55,15 +61,22 @@ class EnvironmentPass:
 
     def __init__(self, gpu: Gpu, variant: EnvironmentVariant) -> None:
         self._gpu = gpu
-        generated = {"generated/planes.glsl": read_source(variant.planes, variant.layout)}
+        generated = {
+            "generated/planes.glsl": read_source(variant.planes, variant.layout),
+            "generated/outputs.glsl": outputs_source(variant.outputs, variant.groups),
+        }
         files = ("screen.vert", "environment.frag")
         self._program = gpu.shaders.program(*files, defines=variant.defines, generated=generated)
         self._screen = gpu.keep(gpu.context.vertex_array(self._program, []))
         self._skies: dict[Environment, moderngl.Texture] = {}
 
-    def draw(self, dome: DomeLight, gbuffer: GBuffer, radiance: Target, first_link: int = ALL_LINKED) -> None:
-        """Add the dome to `radiance`. first_link: place of its bits, which are bound."""
-        radiance.framebuffer.use()
+    def draw(
+        self, planned: PlannedLight, gbuffer: GBuffer, targets: LightTargets, first_link: int = ALL_LINKED
+    ) -> None:
+        """Add a dome to the targets. first_link: place of its bits, which are bound."""
+        dome = planned.light
+        assert isinstance(dome, DomeLight)
+        targets.framebuffers[planned.groups].use()
         self._gpu.context.enable_only(moderngl.BLEND)
         self._gpu.context.blend_func = moderngl.ONE, moderngl.ONE
         sky = sky_of(dome)

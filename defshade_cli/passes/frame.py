@@ -6,6 +6,8 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import Plane
 from defshade_cli.gpu.targets import Target, allocate
 from defshade_cli.passes.gbuffer import GBuffer, make_gbuffer
+from defshade_cli.passes.light_targets import LightTargets, make_light_targets
+from defshade_cli.plan import Plan
 from defshade_cli.settings import Layout
 
 Size = tuple[int, int]
@@ -18,7 +20,8 @@ class Frame:
         self._gpu = gpu
         self._size: Size = (0, 0)
         self._gbuffers: dict[tuple[tuple[Plane, ...], Layout], GBuffer] = {}
-        self._radiance: dict[str, Target] = {}
+        self._radiance: dict[tuple[str, GBuffer | None], Target] = {}
+        self._lights: tuple[tuple, LightTargets | None] = (), None
 
     def gbuffer(self, size: Size, planes: tuple[Plane, ...], layout: Layout) -> GBuffer:
         """The GBuffer of (width, height) in a layout, as last drawn. Raises GpuError."""
@@ -30,15 +33,29 @@ class Frame:
     def radiance(self, name: str, size: Size, gbuffer: GBuffer | None = None) -> Target:
         """A float RGBA target with one texture "radiance"; it tests against the depth of `gbuffer` where given."""
         self._resize(size)
-        key = name if gbuffer is None else f"{name} {gbuffer.layout} {len(gbuffer.planes)}"
+        key = name, gbuffer
         if key not in self._radiance:
             depth = gbuffer.target.depth if gbuffer else None
             self._radiance[key] = allocate(self._gpu, size, {"radiance": (4, "f4")}, depth)
         return self._radiance[key]
 
+    def light_targets(self, radiance: Target, plan: Plan) -> LightTargets:
+        """For the plan's lights, behind the radiance of a sample; those of another kind of plan are freed."""
+        kind = radiance, plan.outputs, plan.groups, frozenset(planned.groups for planned in plan.lights)
+        known, targets = self._lights
+        if targets is None or known != kind:
+            if targets:
+                targets.release()
+            targets = make_light_targets(self._gpu, radiance, plan)
+            self._lights = kind, targets
+        return targets
+
     def _resize(self, size: Size) -> None:
         if size == self._size:
             return
+        if self._lights[1]:
+            self._lights[1].release()
+        self._lights = (), None
         for target in [*self._radiance.values(), *(g.target for g in self._gbuffers.values())]:
             target.release()
         for gbuffer in self._gbuffers.values():

@@ -16,12 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import DEPTH_CLAMP, Gpu
+from defshade_cli.gpu.outputs import output_defines, outputs_source
 from defshade_cli.gpu.planes import Plane, read_source, uses_standard_depth
 from defshade_cli.gpu.records import record
 from defshade_cli.gpu.render_space import space_defines
-from defshade_cli.gpu.targets import Target
+from defshade_cli.image.layers import DEFAULT_GROUP
 from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.gbuffer import GBuffer
+from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.shadows import ShadowAtlas
 from defshade_cli.passes.tables import NO_TABLES, LightTables
@@ -39,7 +41,10 @@ _NO_IES = 0xFFFFFFFF
 
 @dataclass(frozen=True, slots=True)
 class LightingVariant:
-    """What the pass is compiled for; volumes: the kinds that some light has."""
+    """What the pass is compiled for.
+
+    volumes: the kinds that some light has.  outputs: layers beside the radiance.  groups: those that one light is in.
+    """
 
     planes: tuple[Plane, ...]
     layout: Layout
@@ -48,6 +53,8 @@ class LightingVariant:
     shadows: bool
     ies: bool
     volumes: tuple[Volume, ...]
+    outputs: tuple[str, ...] = ()
+    groups: int = 0
     space: RenderSpace = REC709
 
     @classmethod
@@ -61,6 +68,8 @@ class LightingVariant:
             plan.shadows,
             bool(plan.profiles),
             plan.volumes,
+            plan.outputs,
+            plan.most_groups,
             plan.render_space,
         )
 
@@ -68,7 +77,7 @@ class LightingVariant:
     def defines(self) -> list[str]:
         flags = ["CLASSIC"] * (self.shading == "classic") + ["ORTHOGRAPHIC"] * self.orthographic
         flags += ["SHADOWS"] * self.shadows + ["IES"] * self.ies + space_defines(self.space)
-        return [plane.define for plane in self.planes] + flags
+        return [plane.define for plane in self.planes] + flags + output_defines(self.outputs)
 
 
 class LightingPass:
@@ -76,7 +85,10 @@ class LightingPass:
 
     def __init__(self, gpu: Gpu, variant: LightingVariant) -> None:
         self._context = gpu.context
-        generated = {"generated/planes.glsl": read_source(variant.planes, variant.layout)}
+        generated = {
+            "generated/planes.glsl": read_source(variant.planes, variant.layout),
+            "generated/outputs.glsl": outputs_source(variant.outputs, variant.groups),
+        }
         emission = gpu.shaders.program("screen.vert", "emission.frag", defines=variant.defines, generated=generated)
         self._emission = gpu.keep(gpu.context.vertex_array(emission, []))
         self._volumes: dict[Volume, moderngl.VertexArray] = {}
@@ -86,33 +98,38 @@ class LightingPass:
             program = gpu.shaders.program(*files, defines=defines, generated=generated)
             self._volumes[volume] = _volume_array(gpu, volume, program)
 
-    def begin(self, gbuffer: GBuffer, radiance: Target) -> None:
-        """Emission and coverage; `radiance` is overwritten."""
-        radiance.framebuffer.use()
-        radiance.framebuffer.depth_mask = False
+    def begin(self, gbuffer: GBuffer, targets: LightTargets) -> None:
+        """Emission and coverage: the sample's radiance is overwritten, and the group of what is emitted grows."""
+        targets.radiance.framebuffer.use()
+        targets.radiance.framebuffer.depth_mask = False
         self._context.enable_only(moderngl.NOTHING)
         gbuffer.bind(self._emission.program)
         self._emission.render(vertices=3)
+        if DEFAULT_GROUP in targets.sums:
+            targets.sums[DEFAULT_GROUP].framebuffer.use()
+            self._context.enable_only(moderngl.BLEND)
+            self._context.blend_func = moderngl.ONE, moderngl.ONE
+            self._emission.render(vertices=3)
 
     def add(
         self,
         lights: Sequence[PlannedLight],
         gbuffer: GBuffer,
-        radiance: Target,
+        targets: LightTargets,
         shadows: ShadowAtlas | None = None,
         tables: LightTables = NO_TABLES,
     ) -> None:
-        """The volumes of `lights`, whose records are bound, on top of `radiance`."""
-        radiance.framebuffer.use()
+        """The volumes of `lights`, whose records are bound, on top of what the targets hold."""
         self._context.enable_direct(DEPTH_CLAMP)
         self._context.blend_func = moderngl.ONE, moderngl.ONE
         self._context.cull_face = "front"
         self._context.depth_func = ">" if uses_standard_depth(gbuffer.layout) else "<"
-        kinds = [planned.volume for planned in lights]
-        for volume in dict.fromkeys(kinds):
+        alike = [(planned.volume, planned.groups) for planned in lights]
+        for volume, groups in dict.fromkeys(alike):
+            targets.framebuffers[groups].use()
             maps = shadows.depth if shadows else None
             gbuffer.bind(self._volumes[volume].program, shadow_atlas=maps, ies_tables=tables.candela)
-            self._draw_volumes(volume, kinds.index(volume), kinds.count(volume))
+            self._draw_volumes(volume, alike.index((volume, groups)), alike.count((volume, groups)))
         self._context.disable_direct(DEPTH_CLAMP)
 
     def _draw_volumes(self, volume: Volume, first: int, count: int) -> None:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import MOST_TARGETS, Plane
 from defshade_cli.gpu.residence import LIGHTS, VIEW, DrawList, GpuScene, RecordBuffer
-from defshade_cli.gpu.targets import Target
 from defshade_cli.image.film import Film
 from defshade_cli.passes.accumulation import AccumulationPass
 from defshade_cli.passes.emitters import LitSample, light_batches
@@ -18,6 +17,7 @@ from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
 from defshade_cli.passes.identification import Manifests, Mattes, id_manifests
+from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.lighting import LightingPass, LightingVariant, light_records
 from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
@@ -88,16 +88,19 @@ class Pipeline:
         radiance = self._frame.radiance("sample", plan.size, gbuffer)
         total = self._frame.radiance("total", plan.size) if plan.samples > 1 else radiance
         total.framebuffer.clear()
+        targets = self._frame.light_targets(radiance, plan)
+        targets.clear()
         tables = self._tables.update(plan)
         for sample in samples(plan.samples, plan.filter, plan.filter_width):
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             if plan.mattes:
                 mattes.add(gbuffer.target.read("visible"))
-            self._light(draws, scene, plan, sample, tables, gbuffer, radiance)
+            self._light(draws, scene, plan, sample, tables, gbuffer, targets)
             if plan.samples > 1:
                 self._accumulation.add(radiance, total)
         beauty = np.divide(total.read("radiance"), plan.samples, dtype=np.float32)
-        return {"beauty": beauty, "alpha": beauty[..., 3:]} | mattes.layers(), mattes.manifests()
+        lit = {"beauty": beauty, "alpha": beauty[..., 3:]} | targets.layers(plan.samples)
+        return lit | mattes.layers(), mattes.manifests()
 
     def _light(
         self,
@@ -107,19 +110,19 @@ class Pipeline:
         sample: Sample,
         tables: LightTables,
         gbuffer: GBuffer,
-        radiance: Target,
+        targets: LightTargets,
     ) -> None:
         """One sample of every light: as many at a time as the shadow atlas holds."""
         lighting = self._lighting_pass(LightingVariant.of(plan))
-        lighting.begin(gbuffer, radiance)
+        lighting.begin(gbuffer, targets)
         for dome in plan.domes:
             environment = self._environment_pass(EnvironmentVariant.of(plan))
-            environment.draw(dome, gbuffer, radiance, tables.links.lights.get(dome, ALL_LINKED))
+            environment.draw(dome, gbuffer, targets, tables.links.lights.get(dome.light, ALL_LINKED))
         for batch in light_batches(scene, plan, sample) if plan.lit else ():
             shadows = self._shadow_maps(draws, batch, plan, sample, tables) if plan.shadows else None
             lights, emitters = [lit.planned for lit in batch], [lit.emitter for lit in batch]
             self._lights.write(light_records(lights, emitters, plan.camera.position, shadows, tables))
-            lighting.add(lights, gbuffer, radiance, shadows, tables)
+            lighting.add(lights, gbuffer, targets, shadows, tables)
 
     def _shadow_maps(
         self, draws: DrawList, batch: list[LitSample], plan: Plan, sample: Sample, tables: LightTables

@@ -33,10 +33,14 @@ def explain(plan: Plan) -> Iterator[Decision]:
     for volume in ("quad", "sphere", "cone"):
         count = sum(planned.volume == volume for planned in plan.lights)
         yield Decision(f"{volume} volumes", f"{count} drawn" if count else "skipped", "lights that reach geometry")
+    parts = bool(plan.outputs or plan.groups)
+    yield _kept("light in parts", parts, "layers show lobes, groups or shadows", "no layer shows a part of the light")
     yield _kept("shadow maps", plan.shadows, "a light casts them", "no light casts any, or none were asked")
     yield _kept("IES profiles", bool(plan.profiles), "a light is shaped by one", "no light has one")
     yield _kept("shadow linking", plan.shadow_linked, "a light chooses its casters", "everything casts shadows")
     yield _kept("environment", bool(plan.domes), "a dome lights the scene", "no dome")
+    if plan.portals:
+        yield Decision("portals", "passed over", "hints: domes are sampled by their radiance")
     yield _kept("cutout", plan.cutout, "some opacity is or may be below 1", "no opacity is below 1")
     yield _kept("textures", plan.textures, "a material reads them", "no material reads any")
     if plan.data_layers:

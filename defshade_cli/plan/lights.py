@@ -12,6 +12,7 @@ reaches further than the geometry does.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -19,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.image.light_texture import with_texture
+from defshade_cli.plan.groups import group_lights, light_groups, light_outputs
 from defshade_cli.plan.overlap import reaches_into_ball
 from defshade_cli.plan.points import apparent_size, share_points
 from defshade_cli.scene.light import DistantLight, Light, SphereLight
@@ -38,6 +40,7 @@ class PlannedLight:
 
     reach: radius of the volume in scene units, infinite for a quad.
     is_empty: no geometry lies within a sphere light.
+    groups: the layers that sum it.
     points: that stand for the light in each sample; 1 is its far field where there is a single sample.
     """
 
@@ -46,6 +49,7 @@ class PlannedLight:
     reach: float
     number: int = 0
     is_empty: bool = True
+    groups: tuple[str, ...] = ()
     points: int = 1
 
 
@@ -56,18 +60,29 @@ def volume_of(light: Light) -> Volume:
     return "cone" if light.shaping and light.shaping.cone_angle <= 90.0 else "sphere"
 
 
-def plan_lights(scene: Scene, exposure: float, settings: RenderSettings) -> tuple[PlannedLight, ...]:
+def plan_lights(
+    scene: Scene, exposure: float, settings: RenderSettings, layers: Sequence[str] = ()
+) -> tuple[PlannedLight, ...]:
     lights = enumerate(with_texture(light) for light in scene.lights)
     lit = [(number, light) for number, light in lights if _peak(light) > 0.0]
     response = max((_greatest_response(m, settings.shading) for m in scene.materials), default=1.0)
     gain = exposure * response * max(len(lit), 1) / settings.light_tolerance
     order: dict[str, int] = {"quad": 0, "sphere": 1, "cone": 2}
+    groups = group_lights([light for _, light in lit], light_groups(layers), light_outputs(layers))
     points = share_points([apparent_size(light, scene.bounds) for _, light in lit], settings)
     planned = [
-        PlannedLight(light, volume_of(light), _reach(light, scene.bounds, gain), number, _is_empty(light, scene), count)
-        for (number, light), count in zip(lit, points, strict=True)
+        PlannedLight(
+            light=light,
+            volume=volume_of(light),
+            reach=_reach(light, scene.bounds, gain),
+            number=number,
+            is_empty=_is_empty(light, scene),
+            groups=of_light,
+            points=count,
+        )
+        for (number, light), of_light, count in zip(lit, groups, points, strict=True)
     ]
-    return tuple(sorted(planned, key=lambda p: order[p.volume]))
+    return tuple(sorted(planned, key=lambda p: (order[p.volume], p.groups)))
 
 
 def _greatest_response(material: Material, shading: Shading) -> float:

@@ -12,6 +12,7 @@ from defshade_cli.gpu.planes import MOST_TARGETS, Plane, named_planes, needed_pl
 from defshade_cli.image.layers import LAYERS, resolve
 from defshade_cli.image.render_space import RenderSpace, find_render_space
 from defshade_cli.plan.decisions import Decision, explain
+from defshade_cli.plan.groups import light_groups, light_outputs
 from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.ies import IesProfile
@@ -41,6 +42,7 @@ class Plan:
     background: domes are seen where no geometry is.
     cutout: some opacity may be below 1.  textures: some material reads them.
     data_pass: data layers need an unjittered float GBuffer of their own.
+    portals: how many hints for sampling domes the stage has.
     levels: how often subdivision surfaces were refined, ascending; empty without any.
     ranks: (id, coverage) pairs of a Cryptomatte.
     """
@@ -68,6 +70,7 @@ class Plan:
     textures: bool
     data_pass: bool
     complexity: Complexity
+    portals: int
     levels: tuple[int, ...]
     ranks: int
 
@@ -97,13 +100,28 @@ class Plan:
         return frozenset(name for plane in (*self.planes, *self.data_planes) for name in plane.inputs)
 
     @property
+    def outputs(self) -> tuple[str, ...]:
+        """Layers that the light volumes write beside their radiance."""
+        return light_outputs(self.layers)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Layers that are sums of some lights."""
+        return light_groups(self.layers)
+
+    @property
+    def most_groups(self) -> int:
+        """Groups that a light is in."""
+        return max((len(planned.groups) for planned in self.lights), default=0)
+
+    @property
     def mattes(self) -> tuple[str, ...]:
         """The layers that are Cryptomattes."""
         return tuple(name for name in self.layers if LAYERS[name].source == "matte")
 
     @property
-    def domes(self) -> tuple[DomeLight, ...]:
-        return tuple(planned.light for planned in self.lights if isinstance(planned.light, DomeLight))
+    def domes(self) -> tuple[PlannedLight, ...]:
+        return tuple(planned for planned in self.lights if isinstance(planned.light, DomeLight))
 
     @property
     def profiles(self) -> tuple[IesProfile, ...]:
@@ -138,7 +156,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     window = DataWindow(*settings.crop) if settings.crop else from_ndc(scene.data_window, display)
     camera = replace(display_camera, window=window.of(display_camera.window, display))
     exposure = camera.exposure * exposure_scale(settings.exposure)
-    lights = _seen_lights(plan_lights(scene, exposure, settings), layers)
+    lights = _seen_lights(plan_lights(scene, exposure, settings, layers), layers)
     cutout = _has_cutout(scene)
     planes, data_planes, data_pass = _divide_planes(scene, settings, layers, cutout)
     shadows = settings.shadows and bool(scene.drawables) and any(p.light.casts_shadow for p in lights)
@@ -167,6 +185,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         data_pass=data_pass,
         complexity=settings.complexity,
         ranks=settings.cryptomatte_levels,
+        portals=len(scene.portals),
         levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None})),
     )
 

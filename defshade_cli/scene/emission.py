@@ -32,8 +32,9 @@ from defshade_cli.scene.light import (
     RectLight,
     SphereLight,
 )
+from defshade_cli.scene.mesh_light import MeshLight
 from defshade_cli.scene.radiance_map import RadianceMap
-from defshade_cli.spaces import is_similarity, normalize, transform_points
+from defshade_cli.spaces import cofactors, is_similarity, normalize, transform_points
 
 Vector = NDArray[np.float64]
 Place = tuple[float, float, float]
@@ -101,7 +102,7 @@ def emitter_at(light: Light, u: Place, towards: Vector, *, inside: bool = True) 
     patch = _patch(light, u, towards)
     if patch is None or patch.area == 0.0 or light.size_factor == 0.0:
         return far_field(light)
-    cofactor = _cofactors(light.world_from_light[:3, :3]) @ patch.normal
+    cofactor = cofactors(light.world_from_light[:3, :3]) @ patch.normal
     stretch = float(np.linalg.norm(cofactor))
     intensity = light.radiance * patch.weight * (patch.area * stretch)
     position = transform_points(light.world_from_light, patch.point)
@@ -140,6 +141,8 @@ def _distant(light: DistantLight, u: Place) -> Emitter:
 
 def _patch(light: Light, u: Place, towards: Vector) -> _Patch | None:
     match light:
+        case MeshLight():
+            return _Patch(*light.draw(u[:2]))
         case SphereLight(treat_as_point=False, radius=r):
             z = 1.0 - 2.0 * u[0]
             normal = np.array([*_circle(u[1], math.sqrt(max(1.0 - z * z, 0.0))), z])
@@ -180,10 +183,3 @@ def _cardioid(u: float) -> tuple[float, float]:
 def _circle(turn: float, radius: float) -> tuple[float, float]:
     angle = 2.0 * math.pi * turn
     return radius * math.cos(angle), radius * math.sin(angle)
-
-
-def _cofactors(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """det(M) M⁻ᵀ, with the sign that keeps outward normals outward under a mirror."""
-    x, y, z = matrix.T
-    cofactors = np.column_stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])
-    return cofactors * (-1.0 if np.dot(x, cofactors[:, 0]) < 0 else 1.0)

@@ -76,6 +76,7 @@ class Light(ABC):
     world_from_light: (4, 4) float64, scale included: sizes are world-space ones.
     color: (3,) float64 scene-linear, colour temperature multiplied in.
     diffuse, specular: UsdLux's multipliers of the two responses.
+    group: name of the light group; empty without one.
     links: None where all geometry is lit and casts shadows.
     """
 
@@ -89,6 +90,7 @@ class Light(ABC):
     specular: float = 1.0
     shaping: Shaping | None = None
     casts_shadow: bool = True
+    group: str = ""
     links: Links | None = None
 
     kind: ClassVar[str]

@@ -31,6 +31,7 @@ class Scene:
     """A stage at one time code, in world space and scene units.
 
     camera: the one to render; cameras: the paths of all that the stage has.
+    portals: paths of the PortalLights, hints for sampling domes.
     frame: time code, None for the default time.
     assets: path of a drawn prim → path of the component that it is part of; empty unless asked for.
     resolution, pixel_aspect, conform, data_window: of the stage's UsdRenderSettings, where it names one; the window
@@ -45,6 +46,7 @@ class Scene:
     lights: tuple[Light, ...]
     camera: Camera
     cameras: tuple[str, ...] = ()
+    portals: tuple[str, ...] = ()
     unsupported: tuple[Unsupported, ...] = ()
     meters_per_unit: float = 0.01
     up_axis: str = "Y"

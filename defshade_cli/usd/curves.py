@@ -17,9 +17,10 @@ from pxr import Usd, UsdGeom
 from defshade_cli.usd.basis import LARGEST_DETAIL, CurveSamples, Kind, sample_curves
 from defshade_cli.usd.points import read_widths
 from defshade_cli.usd.polygons import Polygons, Primvar
+from defshade_cli.usd.positions import read_positions
 from defshade_cli.usd.primvars import Authored, authored, fit, read_display, read_uvs
 from defshade_cli.usd.tubes import ribbons, tubes
-from defshade_cli.usd.values import floats, integers
+from defshade_cli.usd.values import integers
 
 CURVES_ATTRIBUTES = ("points", "curveVertexCounts", "widths", "normals")
 """What is read of BasisCurves that may vary over time, besides primvars."""
@@ -33,8 +34,7 @@ _DETAILS = ((LARGEST_DETAIL, 12), (4, 6), (2, 3))
 
 def read_curves(curves: UsdGeom.BasisCurves, time: Usd.TimeCode, issues: list[str]) -> Polygons:
     """All curves of the prim, each a face in the sense of `Polygons.faces`. Bad data becomes issues."""
-    value = curves.GetPointsAttr().Get(time)
-    points = None if value is None else floats(value, 3)
+    points = read_positions(curves.GetPrim(), time)
     counts = integers(curves.GetCurveVertexCountsAttr().Get(time) or [])
     points = np.empty((0, 3), np.float32) if points is None else points
     counts = _complete(np.empty(0, np.int32) if counts is None else counts, len(points), issues)

@@ -1,14 +1,13 @@
 """Any surface prim of a stage as one triangulated scene.Mesh.
 
 prim ── mesh | gprims ──→ Polygons ──→ Surface      what is authored, read once
-Surface ── refiner ── normals ── triangulation ── subsets ──→ Gprim      as finely as the picture needs
+Surface ── refiner ── normals ── cut ──→ Gprim      as finely as the picture needs
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,16 +19,18 @@ from defshade_cli.usd import flatness
 from defshade_cli.usd.control import CONTROL_ATTRIBUTES, Control, read_control
 from defshade_cli.usd.copies import Copies
 from defshade_cli.usd.curves import CURVES_ATTRIBUTES, read_curves
+from defshade_cli.usd.cut import Cut, cut, varies
 from defshade_cli.usd.gprims import read_solid, size_attributes
 from defshade_cli.usd.mesh import MESH_ATTRIBUTES, read_mesh
 from defshade_cli.usd.normals import with_normals
 from defshade_cli.usd.nurbs import PATCH_ATTRIBUTES, read_patch
 from defshade_cli.usd.points import POINTS_ATTRIBUTES, read_points
 from defshade_cli.usd.polygons import Polygons, Primvar
+from defshade_cli.usd.positions import is_carried_by_velocities, read_positions
 from defshade_cli.usd.primvars import find_display, find_uvs
 from defshade_cli.usd.refiner import Refiner
+from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.subsets import FaceGroup, Faces, material_subsets, read_faces
-from defshade_cli.usd.triangulation import triangulate
 
 __all__ = ["FaceGroup", "Gprim", "Surface", "is_time_varying", "read_surface", "tessellate"]
 
@@ -75,11 +76,13 @@ class Gprim:
     mesh: triangles sorted so that each group is one run.
     groups: cover every triangle, in the order of Surface.groups; those that refinement left empty are missing.
     issues: what was mended on the way, and why.
+    cut: how the triangles were made.
     """
 
     mesh: Mesh
     groups: tuple[FaceGroup, ...]
     issues: tuple[Unsupported, ...]
+    cut: Cut
 
 
 def read_surface(prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
@@ -109,19 +112,37 @@ def read_surface(prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
     )
 
 
-def tessellate(surface: Surface, refiner: Refiner | None = None) -> Gprim:
-    """The surface in triangles; without a refiner its cage."""
-    issues: list[str] = []
-    polygons = refiner.refine(surface.polygons) if refiner else surface.polygons
-    mesh = _to_mesh(surface, with_normals(polygons).without_holes().joined(), issues)
-    if surface.control:
-        mesh = replace(mesh, level=refiner.level if refiner else 0)
-    mesh, groups = surface.faces.sort(mesh)
-    return Gprim(mesh, groups, tuple(Unsupported(surface.path, issue) for issue in issues))
+def tessellate(surface: Surface, refiner: Refiner | None = None, last: Gprim | None = None) -> Gprim:
+    """The surface in triangles; without a refiner its cage. `last`: an earlier one, of which is kept what fits."""
+    refined = with_normals(refiner.refine(surface.polygons) if refiner else surface.polygons)
+    polygons = shared(refined, last.cut.polygons) if last else refined
+    known = last.cut.moved(polygons, surface.faces) if last else None
+    made = known or cut(polygons, surface.faces, surface.path)
+    level = (refiner.level if refiner else 0) if surface.control else None
+    mesh = replace(made.mesh, double_sided=surface.double_sided, level=level)
+    return Gprim(mesh, made.groups, tuple(Unsupported(surface.path, issue) for issue in made.issues), made)
+
+
+def move_surface(surface: Surface, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
+    """The same with the points of another time; None where they do not fit what stays."""
+    polygons = surface.polygons
+    points = read_positions(prim, time)
+    if points is None or points.shape != polygons.points.shape or not np.isfinite(points[polygons.indices]).all():
+        return None
+    return replace(surface, polygons=replace(polygons, points=points))
+
+
+def only_points_vary(prim: Usd.Prim) -> bool:
+    """Is a mesh, if anything of it varies, the same but for its points?"""
+    return prim.IsA(UsdGeom.Mesh) and varying_names(prim) <= {"points", "velocities", "accelerations"}
 
 
 def is_time_varying(prim: Usd.Prim) -> bool:
-    """Does anything that read_surface reads, primvars inherited and face subsets included, differ over time?"""
+    return bool(varying_names(prim))
+
+
+def varying_names(prim: Usd.Prim) -> set[str]:
+    """Of what read_surface reads, primvars inherited and face subsets included, what may differ over time."""
     primvars = (
         UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals"),
         UsdGeom.PrimvarsAPI(prim).GetPrimvar("widths"),
@@ -131,7 +152,9 @@ def is_time_varying(prim: Usd.Prim) -> bool:
     )
     subsets = (subset.GetIndicesAttr() for subset in material_subsets(prim))
     sources = (*(prim.GetAttribute(name) for name in _attributes(prim)), *primvars, *subsets)
-    return any(source.ValueMightBeTimeVarying() for source in sources if source)
+    names = {str(source.GetName()) for source in sources if source and source.ValueMightBeTimeVarying()}
+    carried = prim.IsA(UsdGeom.PointBased) and is_carried_by_velocities(prim, Usd.TimeCode(0.0))
+    return names | {"velocities"} if carried else names
 
 
 def _read_shape(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> tuple[Polygons | None, Copies | None]:
@@ -159,31 +182,5 @@ def _attributes(prim: Usd.Prim) -> tuple[str, ...]:
     return size_attributes(prim)
 
 
-def _to_mesh(surface: Surface, polygons: Polygons, issues: list[str]) -> Mesh:
-    """Triangles over the points, or over the corners where something on the mesh splits points."""
-    corners, face = triangulate(polygons, issues)
-    if polygons.left_handed:
-        corners = corners[:, ::-1]
-    normals, color, opacity = polygons.normals, polygons.display_color, polygons.display_opacity
-    assert normals is not None
-    split = any(primvar.splits_points for primvar in polygons.primvars)
-    place = polygons.at_corners if split else polygons.at_points
-    return Mesh(
-        path=surface.path,
-        points=polygons.points[polygons.indices] if split else polygons.points,
-        normals=place(normals),
-        triangles=(corners if split else polygons.indices[corners]).astype(np.uint32),
-        faces=polygons.faces[face],
-        display_color=place(color) if _varies(color) else None,
-        display_opacity=place(opacity) if _varies(opacity) else None,
-        double_sided=surface.double_sided,
-        uvs={name: place(uv) for name, uv in polygons.uvs.items()},
-    )
-
-
-def _varies(primvar: Primvar | None) -> TypeGuard[Primvar]:
-    return primvar is not None and primvar.interpolation != "constant"
-
-
 def _constant(primvar: Primvar | None) -> NDArray[np.float32] | None:
-    return None if primvar is None or _varies(primvar) else primvar.values[0]
+    return None if primvar is None or varies(primvar) else primvar.values[0]

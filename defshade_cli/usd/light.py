@@ -1,7 +1,7 @@
 """UsdLux lights in scene terms.
 
-What the scene cannot say yet (lights made of geometry, portals, plug-in lights, filters, connected inputs)
-is reported; a light that has some of these is read without them.
+What the scene cannot say yet (plug-in lights, filters, connected inputs) is reported; a light that has some of these is
+read without them.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from defshade_cli.scene.light import (
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.dome import is_dome, pole, sky_texture
 from defshade_cli.usd.light_files import with_files
+from defshade_cli.usd.mesh_light import Glow, is_mesh_light, read_glow
 
 CAMERA_LIGHT = "<camera light>"
 """Path of the light of a stage that has none."""
@@ -41,6 +42,14 @@ _CLASSES: tuple[tuple[Any, type[Light], tuple[str, ...]], ...] = (
 )
 """Schema, scene class, and the inputs that say its size."""
 
+_GROUP_ATTRIBUTES = (
+    "inputs:lightGroup",
+    "inputs:ri:light:lightGroup",
+    "primvars:arnold:aov",
+    "primvars:karma:light:lpetag",
+)
+"""A light's group: ours, since UsdLux has none, then RenderMan's, Arnold's and Karma's."""
+
 _WHITE = np.array(UsdLux.BlackbodyTemperatureAsRgb(6500.0))
 
 
@@ -48,10 +57,11 @@ def is_light(prim: Usd.Prim) -> bool:
     return prim.HasAPI(UsdLux.LightAPI)
 
 
-def read_light(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Light | None, tuple[Unsupported, ...]]:
+def read_light(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Light | Glow | None, tuple[Unsupported, ...]]:
     """The light at `time` in its own space (world_from_light is the identity, or a dome's pole), and what is left out.
 
-    None for a kind that is not supported. Purposes do not concern lights, as in Hydra.
+    A Glow for what shines by its geometry, None for a kind that is not supported. Purposes do not concern lights, as in
+    Hydra; what glows is geometry first.
     """
     path = str(prim.GetPath())
     if is_dome(prim):
@@ -66,6 +76,10 @@ def read_light(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Light | None, tuple[
             light = light_class(path=path, world_from_light=np.eye(4), **_common(prim, time), **fields)
             light, lost = with_files(light, prim, time)
             return light, tuple(Unsupported(path, reason) for reason in (*lost, *_left_out(prim, time)))
+    if is_mesh_light(prim):
+        glow = read_glow(prim, **_common(prim, time))
+        lost = () if glow else ("it names no geometry",)
+        return glow, tuple(Unsupported(path, reason) for reason in (*lost, *_left_out(prim, time)))
     return None, (Unsupported(path, f"lights of type {prim.GetTypeName()} are not supported yet"),)
 
 
@@ -96,7 +110,13 @@ def _common(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any]:
     casts_shadow = _input(prim, "shadow:enable", time) if prim.HasAPI(UsdLux.ShadowAPI) else True
     values = {name: _input(prim, name, time) for name in ("intensity", "exposure", "normalize", "diffuse", "specular")}
     shaping = _shaping(prim, time) if prim.HasAPI(UsdLux.ShapingAPI) else None
-    return {"color": color, "shaping": shaping, "casts_shadow": casts_shadow} | values
+    return {"color": color, "shaping": shaping, "casts_shadow": casts_shadow, "group": _group(prim)} | values
+
+
+def _group(prim: Usd.Prim) -> str:
+    """The light group, in the first of the ways to say it; empty without one."""
+    values = (attribute.Get() for name in _GROUP_ATTRIBUTES if (attribute := prim.GetAttribute(name)))
+    return next((str(value) for value in values if value), "")
 
 
 def _shaping(prim: Usd.Prim, time: Usd.TimeCode) -> Shaping:

@@ -9,9 +9,10 @@ from pxr import Sdf, Usd, UsdGeom
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.usd import draw_mode
 from defshade_cli.usd.binding import Bindings, read_bindings
-from defshade_cli.usd.geometry import Surface, is_time_varying, read_surface
+from defshade_cli.usd.geometry import Surface, is_time_varying, move_surface, only_points_vary, read_surface
 from defshade_cli.usd.kind import Kinds
 from defshade_cli.usd.material import ReadMaterial, read_material
+from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.skel import Rigs
 
 
@@ -38,14 +39,21 @@ class Memory:
     def surface(self, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
         """The same object at every time, unless something of the prim varies."""
         path = prim.GetPath()
-        if path in self._surfaces:
-            time_read, surface = self._surfaces[path]
-            if time == time_read or not self._is_time_varying(prim):
-                return surface
-        read = read_surface(prim, time)
-        surface = None if read is None else self._as_shown(read, path)
+        time_read, known = self._surfaces.get(path, (None, None))
+        if time_read is not None and (time == time_read or not self._is_time_varying(prim)):
+            return known
+        surface = self._at_another_time(known, prim, time) if known else self._read_surface(prim, time)
         self._surfaces[path] = time, surface
         return surface
+
+    def _at_another_time(self, known: Surface, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
+        """Read is no more than varies; what turns out to be equal stays the same object."""
+        moved = move_surface(known, prim, time) if known.groups and only_points_vary(prim) else None
+        return shared(moved or self._read_surface(prim, time), known)
+
+    def _read_surface(self, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
+        surface = read_surface(prim, time)
+        return None if surface is None else self._as_shown(surface, prim.GetPath())
 
     def stand_in(self, prim: Usd.Prim, mode: str) -> Surface:
         """What is drawn of a model in a draw mode; it does not vary over time."""

@@ -8,8 +8,9 @@ from pxr import Usd, UsdGeom
 
 from defshade_cli.usd.normals import mend_normals
 from defshade_cli.usd.polygons import SCHEMES, Polygons, Primvar, Scheme
+from defshade_cli.usd.positions import read_positions
 from defshade_cli.usd.primvars import Authored, Elements, authored, count_elements, fit, read_display, read_uvs
-from defshade_cli.usd.values import floats, integers
+from defshade_cli.usd.values import integers
 
 MESH_ATTRIBUTES = ("points", "faceVertexCounts", "faceVertexIndices", "holeIndices", "normals")
 """What is read of a Mesh that may vary over time, besides primvars."""
@@ -40,8 +41,7 @@ def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> Poly
 
 
 def _points(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> NDArray[np.float32]:
-    value = mesh.GetPointsAttr().Get(time)
-    points = None if value is None else floats(value, 3)
+    points = read_positions(mesh.GetPrim(), time)
     if points is None or not len(points):
         issues.append("it has no points")
         return np.empty((0, 3), np.float32)

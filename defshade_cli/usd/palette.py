@@ -22,7 +22,7 @@ class Palette:
         self.issues: dict[Unsupported, None] = {}
         self._memory, self._time = memory, time
         self._numbers: dict[Material, int] = {}
-        self._chosen: dict[Bindings, int] = {}
+        self._chosen: dict[Bindings, Material] = {}
 
     @property
     def materials(self) -> tuple[Material, ...]:
@@ -30,8 +30,16 @@ class Palette:
 
     def number(self, bindings: Bindings) -> int:
         """Index into `materials` of the one that is drawn."""
+        return self.number_of(self.material(bindings))
+
+    def number_of(self, material: Material) -> int:
+        """Index into `materials`, of which it becomes one."""
+        return self._numbers.setdefault(material, len(self._numbers))
+
+    def material(self, bindings: Bindings) -> Material:
+        """The one that is drawn."""
         if bindings not in self._chosen:
-            self._chosen[bindings] = self._numbers.setdefault(self._choose(bindings), len(self._numbers))
+            self._chosen[bindings] = self._choose(bindings)
         return self._chosen[bindings]
 
     def _choose(self, bindings: Bindings) -> Material:

@@ -11,6 +11,7 @@ from pxr import Usd, UsdGeom
 from defshade_cli.usd.copies import Copies
 from defshade_cli.usd.gprims import sphere
 from defshade_cli.usd.polygons import Polygons, Primvar
+from defshade_cli.usd.positions import read_positions
 from defshade_cli.usd.primvars import Authored, Elements, authored, count_elements, fit, read_display
 from defshade_cli.usd.values import floats
 
@@ -27,8 +28,7 @@ _FEWEST_SEGMENTS = 8
 
 def read_points(points: UsdGeom.Points, time: Usd.TimeCode, issues: list[str]) -> tuple[Polygons, Copies]:
     """A sphere of diameter 1, and the points that it is placed at: all that are finite."""
-    value = points.GetPointsAttr().Get(time)
-    positions = None if value is None else floats(value, 3)
+    positions = read_positions(points.GetPrim(), time)
     if positions is None or not len(positions):
         issues.append("it has no points")
         positions = np.empty((0, 3), np.float32)

@@ -137,18 +137,23 @@ class Polygons:
         return self.select(~np.isin(self.faces, self.holes)) if len(self.holes) else self
 
     def joined(self) -> Polygons:
-        """The same with face-varying primvars on the points, where the corners at every point agree."""
-        a_corner = np.zeros(len(self.points), np.intp)
-        a_corner[self.indices] = np.arange(len(self.indices))
+        """The same with every primvar joined."""
+        return self.with_primvars(self.join)
 
-        def join(primvar: Primvar) -> Primvar:
-            if primvar.interpolation != "faceVarying" or not len(primvar.values):
-                return primvar
-            at_points = primvar.values[a_corner]
-            agree = np.array_equal(at_points[self.indices], primvar.values)
-            return Primvar(at_points, "vertex") if agree else primvar
+    def join(self, primvar: Primvar) -> Primvar:
+        """A face-varying primvar on the points, where the corners at every point agree."""
+        if primvar.interpolation != "faceVarying" or not len(primvar.values):
+            return primvar
+        at_points = primvar.values[self._a_corner]
+        agree = np.array_equal(at_points[self.indices], primvar.values)
+        return Primvar(at_points, "vertex") if agree else primvar
 
-        return self.with_primvars(join)
+    @cached_property
+    def _a_corner(self) -> NDArray[np.intp]:
+        """(P,) some corner at each point; the first of all at a point without."""
+        corner = np.zeros(len(self.points), np.intp)
+        corner[self.indices] = np.arange(len(self.indices))
+        return corner
 
     def at_corners(self, primvar: Primvar) -> NDArray[np.float32]:
         """(C, ...) a primvar of any interpolation."""

@@ -26,6 +26,7 @@ from defshade_cli.usd.instancing import Piece
 from defshade_cli.usd.light import camera_light
 from defshade_cli.usd.linking import link
 from defshade_cli.usd.memory import Memory
+from defshade_cli.usd.mesh_light import Glow, Glows, glowing_lights, shown_material
 from defshade_cli.usd.palette import Palette
 from defshade_cli.usd.settings import read_settings
 from defshade_cli.usd.tessellation import Tessellation
@@ -35,6 +36,7 @@ from defshade_cli.usd.unresolved import find_unresolved
 log = logging.getLogger("defshade")
 
 PlacedSurface = tuple[Piece, Surface]
+Glowing = tuple[Glow, tuple[Light, ...]]
 
 
 class StageReader:
@@ -97,7 +99,9 @@ class StageReader:
         gprims = self._tessellate(drawn, camera)
         palette = Palette(self._memory, time)
         meshes: dict[Mesh, int] = {}
-        lights, drawables = link(self._stage, list(_lights(pieces)), list(_drawables(drawn, gprims, meshes, palette)))
+        glowing = _glowing(drawn, gprims, traversal.glows, palette)
+        shown = [*_drawables(drawn, gprims, meshes, palette, glowing)]
+        lights, drawables = link(self._stage, [*_lights(pieces), *_all(glowing)], shown)
         mended = dict.fromkeys(issue for gprim in gprims.values() for issue in gprim.issues)
         return Scene(
             name=facts.stage_name(self._stage),
@@ -105,6 +109,7 @@ class StageReader:
             drawables=drawables,
             materials=palette.materials,
             lights=lights,
+            portals=tuple(traversal.portals),
             camera=camera,
             cameras=self._cameras,
             unsupported=(*self._issues, *traversal.issues, *mended, *palette.issues, *camera_issues),
@@ -146,14 +151,23 @@ def _drawn(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[PlacedS
 
 
 def _drawables(
-    drawn: Iterable[PlacedSurface], gprims: Mapping[Surface, Gprim], meshes: dict[Mesh, int], palette: Palette
+    drawn: Iterable[PlacedSurface],
+    gprims: Mapping[Surface, Gprim],
+    meshes: dict[Mesh, int],
+    palette: Palette,
+    glowing: Mapping[Piece, Glowing],
 ) -> Iterator[Drawable]:
     """What is drawn; `meshes` takes the meshes, each with its number."""
     for piece, surface in drawn:
         gprim = gprims[surface]
         if not gprim.groups:
             continue
-        subsets = (Subset(palette.number(piece.bindings[g.path]), g.first, g.count) for g in gprim.groups)
+        materials = [palette.material(piece.bindings[group.path]) for group in gprim.groups]
+        if piece in glowing:
+            glow, lights = glowing[piece]
+            materials = [shown_material(material, glow, lights[0]) for material in materials]
+        numbered = zip(gprim.groups, map(palette.number_of, materials), strict=True)
+        subsets = (Subset(number, group.first, group.count) for group, number in numbered)
         yield Drawable(
             mesh=meshes.setdefault(gprim.mesh, len(meshes)),
             world_from_object=piece.root_from_object,
@@ -168,6 +182,22 @@ def _drawables(
 def _paths(drawables: Iterable[Drawable]) -> dict[str, None]:
     """Of every prim that is drawn, each once."""
     return dict.fromkeys(path for drawable in drawables for path in drawable.paths)
+
+
+def _glowing(
+    drawn: Iterable[PlacedSurface], gprims: Mapping[Surface, Gprim], glows: Glows, palette: Palette
+) -> dict[Piece, Glowing]:
+    """The surfaces that are lights, and these."""
+    found = ((piece, gprims[surface], glows[surface.path]) for piece, surface in drawn if surface.path in glows)
+    return {
+        piece: (glow, tuple(glowing_lights(piece, gprim, glow, palette.material)))
+        for piece, gprim, glow in found
+        if gprim.groups and len(piece.root_from_object)
+    }
+
+
+def _all(glowing: Mapping[Piece, Glowing]) -> Iterator[Light]:
+    return (light for _, lights in glowing.values() for light in lights)
 
 
 def _lights(pieces: Iterable[Piece]) -> Iterator[Light]:

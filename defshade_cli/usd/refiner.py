@@ -28,6 +28,7 @@ class Refiner:
         self.control, self.level = control, level
         self._refinement = refine(control.topology, level)
         self._limit = limit(self._refinement)
+        self._last: dict[Primvar, Primvar] = {}
         self._face_varying: dict[bytes, tuple[Stencils, NDArray[np.int32]]] = {}
 
     def fits(self, control: Control, level: int) -> bool:
@@ -44,7 +45,8 @@ class Refiner:
             faces=cage.faces[self._refinement.parents],
             holes=np.empty(0, np.int32),
         )
-        surface = surface.with_primvars(lambda primvar: self._carried(primvar, cage))
+        self._last = {p: self._last.get(p) or self._carried(p, cage) for p in surface.primvars}
+        surface = surface.with_primvars(self._last.__getitem__)
         return replace(surface, normals=self._normals(surface, refined)).select(~self._refinement.holes)
 
     def _normals(self, surface: Polygons, refined: NDArray[np.float64]) -> Primvar:

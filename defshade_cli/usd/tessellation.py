@@ -23,7 +23,7 @@ class Tessellation:
         known, at, gprim = self._gprims.get(surface.path, (None, 0, None))
         if gprim is None or known is not surface or at != level:
             refiner = self._refiner(surface.path, surface.control, level) if surface.control and level else None
-            gprim = tessellate(surface, refiner)
+            gprim = tessellate(surface, refiner, gprim if at == level else None)
             self._gprims[surface.path] = surface, level, gprim
         return gprim
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from pxr import Sdf, Usd, UsdGeom, UsdSkel
+from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdSkel
 
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.scene import Unsupported
@@ -21,6 +21,7 @@ from defshade_cli.usd.instancing import Piece, Standing, place
 from defshade_cli.usd.kind import Kind
 from defshade_cli.usd.light import is_light, read_light
 from defshade_cli.usd.memory import Memory
+from defshade_cli.usd.mesh_light import Glow
 from defshade_cli.usd.native_instances import NativeInstances
 from defshade_cli.usd.point_instancer import has_varying_copies, read_point_instancer
 from defshade_cli.usd.skel import Rig
@@ -35,11 +36,14 @@ class Traversal:
 
     issues: what is left out, as the keys of a dictionary to keep their order.
     dormant: something is absent now, but not at all times.
+    glows: what makes surfaces lights, by their paths.  portals: paths of the hints for sampling domes.
     """
 
     def __init__(self, stage: Usd.Stage, memory: Memory, time: Usd.TimeCode, purposes: Sequence[str]) -> None:
         self.issues: dict[Unsupported, None] = {}
         self.dormant = False
+        self.glows: dict[str, Glow] = {}
+        self.portals: list[str] = []
         self._stage, self._memory, self._time, self._purposes = stage, memory, time, purposes
         self._prototypes: dict[tuple[Sdf.Path, Sdf.Path | None], tuple[Piece, ...] | None] = {}
         memory.xforms.SetTime(time)
@@ -94,10 +98,7 @@ class Traversal:
     def _own_pieces(self, prim: Usd.Prim, kind: Kind, here: Standing) -> Iterator[Piece]:
         """What the prim itself is, whatever stands below it."""
         if is_light(prim):
-            light, issues = read_light(prim, self._time)
-            self._report(prim, *(issue.reason for issue in issues))
-            if light is not None:
-                yield self._piece(prim, here, light)
+            yield from self._light(prim, here)
         if kind is Kind.GPRIM and here.purpose in (None, *self._purposes):
             yield from self._gprim(prim, here)
         elif kind is Kind.UNDRAWN:
@@ -110,6 +111,19 @@ class Traversal:
         surface = self._memory.stand_in(prim, here.draw_mode or FULL)
         self.issues.update(dict.fromkeys(surface.issues))
         return self._piece(prim, here, surface, {path: bound_to(path) for path in surface.groups})
+
+    def _light(self, prim: Usd.Prim, here: Standing) -> Iterator[Piece]:
+        """A light with a shape of its own; portals and surfaces that glow are noted."""
+        path = self._memory.shown(prim.GetPath())
+        if prim.IsA(UsdLux.PortalLight):
+            self.portals.append(path)
+            return
+        light, issues = read_light(prim, self._time)
+        self._report(prim, *(issue.reason for issue in issues))
+        if isinstance(light, Glow):
+            self.glows[light.surface or path] = light
+        elif light is not None:
+            yield self._piece(prim, here, light)
 
     def _gprim(self, prim: Usd.Prim, here: Standing) -> Iterator[Piece]:
         surface = self._memory.surface(prim, self._time)

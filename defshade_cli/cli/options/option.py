@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from defshade_cli.image.layers import ALIASES, LAYERS
+from defshade_cli.image.layers import ALIASES, FAMILIES, LAYERS
 
 Function = Callable[..., Any]
 
@@ -40,7 +40,8 @@ def epilog(*examples: str, layers: bool = False) -> str:
     r"""What stands below a command's options: examples, the table of layers. \b keeps click from wrapping."""
     paragraphs = ["\b\nExamples:\n" + "\n".join(f"  {example}" for example in examples)]
     if layers:
-        lines = (f"  {name:<20}{''.join(layer.channels):<6}{layer.summary}" for name, layer in LAYERS.items())
+        rows = [*LAYERS.items(), *((layer.name, layer) for layer in FAMILIES.values())]
+        lines = (f"  {name:<20}{''.join(layer.channels):<6}{layer.summary}" for name, layer in rows)
         paragraphs.append("\b\nLayers:\n" + "\n".join(lines))
         known_as = (f"{theirs} {ours}" for theirs, ours in ALIASES.items())
         paragraphs.append("Other names of layers: " + ", ".join(known_as) + ".")

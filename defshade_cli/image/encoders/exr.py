@@ -63,7 +63,7 @@ def _part(film: Film, names: tuple[str, ...], output: OutputSettings) -> _Part:
     planes = tuple(bounded(name, film.layers[name], half=name in halves) for name in names)
     spec = _spec(film, names, halves, output.compression)
     if output.multipart:
-        spec.attribute("oiio:subimagename", MAIN_PART if names == (BEAUTY,) else names[0])
+        spec.attribute("oiio:subimagename", MAIN_PART if names == (BEAUTY,) else LAYERS[names[0]].exr_name)
     if output.tiled or output.mipmaps:
         spec.tile_width = spec.tile_height = TILE
     if output.mipmaps:

@@ -6,12 +6,16 @@ names   what other renderers call them, and how a request becomes rows
 
 from defshade_cli.image.layers.layer import BEAUTY, ID, MAIN_PART, SCENE_LINEAR, SCENE_UNITS, UNIT_VECTOR, Layer
 from defshade_cli.image.layers.names import ALIASES, LAYERS, in_order, layer_in_file, resolve
+from defshade_cli.image.layers.table import DEFAULT_GROUP, FAMILIES, LIGHT_FAMILY
 
 __all__ = [
     "ALIASES",
     "BEAUTY",
+    "DEFAULT_GROUP",
+    "FAMILIES",
     "ID",
     "LAYERS",
+    "LIGHT_FAMILY",
     "MAIN_PART",
     "SCENE_LINEAR",
     "SCENE_UNITS",

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 SampledSource = Literal["lighting", "coverage", "matte"]
 """Sources that are summed over samples; any other is a plane of the data GBuffer."""
+
+_UNSAFE = re.compile(r"\W+", re.ASCII)
 
 BEAUTY = "beauty"
 MAIN_PART = "rgba"
@@ -71,8 +74,9 @@ class Layer:
 
     @property
     def exr_name(self) -> str:
-        """What stands before the channels."""
-        return self.name[0].upper() + self.name[1:] if self.source == "matte" else self.name
+        """What stands before the channels: letters, digits and _ alone, as compositors ask."""
+        name = _UNSAFE.sub("_", self.name).strip("_")
+        return name[0].upper() + name[1:] if self.source == "matte" else name
 
     def of_width(self, width: int) -> Layer:
         """The same with `width` channels: its first ones, or of a matte as many as there are ranks."""

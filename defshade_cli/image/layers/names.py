@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import difflib
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 
 from defshade_cli.errors import UsageError
 from defshade_cli.image.layers.layer import Layer
-from defshade_cli.image.layers.table import ROWS
+from defshade_cli.image.layers.table import FAMILIES, LIGHT_FAMILY, ROWS, family_row
 
 ALIASES: dict[str, str] = {
     # Hydra: HdAovTokens
@@ -32,6 +33,9 @@ ALIASES: dict[str, str] = {
     "Position": "position",
     "Normal": "normal",
     "UV": "uv",
+    "DiffDir": "diffuse",
+    "GlossDir": "specular",
+    "Shadow": "shadow",
     "DiffCol": "albedo",
     "Emit": "emission",
     "IndexMA": "materialId",
@@ -43,10 +47,13 @@ ALIASES: dict[str, str] = {
 
 
 class LayerTable(Mapping[str, Layer]):
-    """The rows in their order; iteration and length are those of the fixed ones."""
+    """The rows in their order; a look-up also finds those of families, such as `light:key`."""
 
     def __getitem__(self, name: str) -> Layer:
-        return ROWS[name]
+        row = ROWS.get(name) or family_row(name)
+        if row is None:
+            raise KeyError(name)
+        return row
 
     def __iter__(self) -> Iterator[str]:
         return iter(ROWS)
@@ -63,11 +70,22 @@ def resolve(names: Iterable[str]) -> tuple[str, ...]:
 
     Raises UsageError for a name that nobody has.
     """
-    asked = [each for name in names for each in (LAYERS if name == "all" else [ALIASES.get(name, name)])]
+    every = [each for name in names for each in (LAYERS if name == "all" else [_ours(name)])]
+    asked = tuple(dict.fromkeys(every))
     unknown = [name for name in asked if name not in LAYERS]
     if unknown or not asked:
-        raise UsageError(f"no layer named {_guess(unknown)}; there are {', '.join(LAYERS)}")
-    return tuple(dict.fromkeys(asked))
+        families = (row.name for row in FAMILIES.values())
+        raise UsageError(f"no layer named {_guess(unknown)}; there are {', '.join([*LAYERS, *families])}")
+    in_file = Counter(LAYERS[name].exr_name for name in asked)
+    if alike := [name for name in asked if in_file[LAYERS[name].exr_name] > 1]:
+        raise UsageError(f"layers {' and '.join(alike)} would have one name in a file: {LAYERS[alike[0]].exr_name}")
+    return asked
+
+
+def _ours(name: str) -> str:
+    """Arnold's light groups are RGBA_name."""
+    group = name.removeprefix("RGBA_")
+    return ALIASES.get(name, name) if group == name else LIGHT_FAMILY + group
 
 
 def _guess(unknown: list[str]) -> str:
@@ -83,5 +101,6 @@ def layer_in_file(prefix: str) -> str:
 
 
 def in_order(names: Iterable[str]) -> tuple[str, ...]:
-    """`names` as the table orders them, so that files do not depend on the order of a request."""
-    return tuple(sorted(names, key=list(LAYERS).index))
+    """`names` as the table orders them, families last, so that files do not depend on the order of a request."""
+    place = {name: number for number, name in enumerate(LAYERS)}
+    return tuple(sorted(names, key=lambda name: (place.get(name, len(place)), name)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import inf
 
 from defshade_cli.image.layers.layer import BEAUTY, ID, MATTE_CHANNELS, SCENE_LINEAR, SCENE_UNITS, UNIT_VECTOR, Layer
@@ -14,6 +15,10 @@ DEFAULT_RANKS = RenderSettings().cryptomatte_levels
 
 def _color(name: str, source: str, summary: str) -> Layer:
     return Layer(name, ("R", "G", "B"), SCENE_LINEAR, "render", source, 0.0, False, summary)
+
+
+def _light(name: str, summary: str) -> Layer:
+    return Layer(name, ("R", "G", "B"), SCENE_LINEAR, "render", "lighting", 0.0, True, summary)
 
 
 def _scalar(name: str, source: str, summary: str, first: int = 0, background: float = 0.0) -> Layer:
@@ -46,6 +51,12 @@ ROWS: dict[str, Layer] = {
     for layer in (
         Layer(BEAUTY, _RGBA, SCENE_LINEAR, "render", "lighting", 0.0, True, "the lit image, alpha premultiplied"),
         Layer("alpha", ("A",), "0..1", "none", "coverage", 0.0, True, "the beauty's coverage by itself"),
+        _light("diffuse", "light from diffuse lobes"),
+        _light("specular", "light from specular lobes and clearcoats"),
+        Layer("shadow", ("Y",), "0..1", "none", "lighting", 1.0, True, "share of the lights' irradiance that arrives"),
+        Layer(
+            "lightComplexity", ("Y",), "volumes", "none", "lighting", 0.0, True, "light volumes that touch the pixel"
+        ),
         _range("depth", "planar: distance along the camera's axis"),
         _range("distance", "radial: distance from the camera's position"),
         _point("position", "world", "the point that the pixel's centre sees"),
@@ -72,3 +83,19 @@ ROWS: dict[str, Layer] = {
         _matte("cryptoAsset", "Cryptomatte of components, as model kinds have them"),
     )
 }
+
+LIGHT_FAMILY = "light:"
+DEFAULT_GROUP = f"{LIGHT_FAMILY}default"
+
+FAMILIES: dict[str, Layer] = {
+    LIGHT_FAMILY: _light(f"{LIGHT_FAMILY}GROUP", "light of a group: by name, light's name or path; * matches any"),
+}
+"""Rows for any number of layers, by how their names begin."""
+
+
+def family_row(name: str) -> Layer | None:
+    """The row of a layer such as `light:key`; None for what is of no family."""
+    for prefix, row in FAMILIES.items():
+        if name.startswith(prefix) and len(name) > len(prefix):
+            return replace(row, name=name)
+    return None

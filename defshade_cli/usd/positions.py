@@ -1,0 +1,32 @@
+"""Where the points of a prim are at a time, moved by velocities where there are any."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+from defshade_cli.usd.values import floats
+
+
+def read_positions(prim: Usd.Prim, time: Usd.TimeCode) -> NDArray[np.float32] | None:
+    """(P, 3) of a PointBased prim; None where nothing fit to draw is authored.
+
+    Where velocities stand beside the points' last sample, points move on from there by them and by accelerations, as
+    UsdGeomPointBased says, and are not interpolated: between samples, the number of points may change.
+    """
+    based = UsdGeom.PointBased(prim)
+    moved = based.ComputePointsAtTime(time, time) if is_carried_by_velocities(prim, time) else None
+    value = moved if moved is not None and len(moved) else based.GetPointsAttr().Get(time)
+    return None if value is None else floats(value, 3)
+
+
+def is_carried_by_velocities(prim: Usd.Prim, time: Usd.TimeCode) -> bool:
+    """Velocities carry points away from time samples; a default value is at all times where it is."""
+    based = UsdGeom.PointBased(prim)
+    if time.IsDefault() or not based.GetVelocitiesAttr().HasAuthoredValue():
+        return False
+    return based.GetPointsAttr().GetResolveInfo().GetSource() in (
+        Usd.ResolveInfoSourceTimeSamples,
+        Usd.ResolveInfoSourceValueClips,
+    )
