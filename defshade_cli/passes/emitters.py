@@ -61,8 +61,10 @@ def _emitters(number: int, planned: PlannedLight, plan: Plan, sample: Sample, ex
     if plan.samples * planned.points == 1:
         return [far_field(light)]
     towards = extent.receivers.mean(axis=0) + plan.camera.position
-    places = [sample.on_light(number, k, planned.points) for k in range(planned.points)]
-    points = [emitter_at(light, u, towards, inside=planned.is_empty) for u in places]
+    points = [
+        emitter_at(light, sample.on_light(number, k, planned.points), towards, inside=planned.is_empty)
+        for k in range(planned.points)
+    ]
     return [point.one_of(planned.points).shared_by(plan.samples) for point in points]
 
 
@@ -92,7 +94,9 @@ def _corners(box: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _lit_sample(planned: PlannedLight, emitter: Emitter, plan: Plan, extent: ShadowExtent) -> LitSample:
     light = planned.light
-    within_itself = isinstance(light, MeshLight) and plan.samples * planned.points == 1  # its far field shines from amid its own surface
+    within_itself = (
+        isinstance(light, MeshLight) and plan.samples * planned.points == 1
+    )  # its far field shines from amid its own surface
     if not (plan.shadows and light.casts_shadow) or within_itself:
         return LitSample(planned, emitter, ())
     relative = emitter.relative_to(plan.camera.position)

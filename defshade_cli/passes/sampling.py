@@ -16,7 +16,7 @@ Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 
 _MASK = 0xFFFFFFFF
-_PLASTIC = 0.7548776662466927
+_GOLDEN, _ROOT_3 = 0.6180339887498949, 0.7320508075688772
 _PIXEL, _TEXEL, _LENS, _LIGHTS = range(4)
 
 
@@ -57,11 +57,11 @@ def samples(count: int, kind: Filter = "box", width: float = 1.0) -> Iterator[Sa
 
 
 def lattice(k: int, count: int) -> Triple:
-    """The k-th of `count` points as even as few can be: powers of the plastic number's inverse (Roberts 2018, R2).
+    """The k-th of `count` points as even as few can be: Fibonacci's lattice, and multiples of √3 for depth.
 
-    On a disk's polar coordinates this is a spiral like a sunflower's.
+    On a disk's polar coordinates this is the spiral of a sunflower (Vogel 1979).
     """
-    return (k + 0.5) / count, (0.5 + k * _PLASTIC) % 1.0, (0.5 + k * _PLASTIC**2) % 1.0
+    return (k + 0.5) / count, (0.5 + k * _GOLDEN) % 1.0, (0.5 + k * _ROOT_3) % 1.0
 
 
 def owen_sobol(index: int, pattern: int) -> Pair:

@@ -177,7 +177,7 @@ def _cardioid(u: float) -> tuple[float, float]:
         turn = 0.5 * (low + high)
         below = turn + math.sin(math.tau * turn) / math.tau + 0.5 < u
         low, high = (turn, high) if below else (low, turn)
-    return turn, 1.0 + math.cos(math.tau * turn)
+    return turn, max(1.0 + math.cos(math.tau * turn), 1e-9)
 
 
 def _circle(turn: float, radius: float) -> tuple[float, float]:
