@@ -12,35 +12,58 @@ from typing import Any, Self
 
 from defshade_cli import __version__
 from defshade_cli.errors import UsageError
-from defshade_cli.farm.fingerprint import Fingerprint
-from defshade_cli.farm.targets import FINGERPRINT, check_outputs, frame_files, frame_paths, is_done, remove_leftovers
+from defshade_cli.farm.open_job import OpenJob
+from defshade_cli.farm.shots import Shot
+from defshade_cli.farm.targets import FINGERPRINT, check_outputs, is_done, remove_leftovers, shot_files, shot_paths
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.files import write
 from defshade_cli.image.film import Film
-from defshade_cli.image.layers import resolve
-from defshade_cli.image.layers.extras import extras_of
+from defshade_cli.image.layers import BEAUTY
 from defshade_cli.passes.pipeline import Pipeline
-from defshade_cli.plan import Plan, make_plan
+from defshade_cli.plan import Plan, make_plan, plan_moments
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Composition, RenderJob, RenderSettings
-from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FrameResult:
-    """What became of one frame.
+class ImageResult:
+    """What became of one image.
 
     paths: the files written, or found where `skipped`.  film, plan: None where skipped.
-    seconds: wall time per step: open (first frame only), read, plan, context, draw, write.
+    seconds: wall time per step: read, plan, context, draw, write.
     """
 
-    frame: float | None
     paths: tuple[Path, ...]
     skipped: bool = False
     film: Film | None = None
     plan: Plan | None = None
     seconds: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameResult:
+    """What became of one frame: an image for each product of the stage's, or one.
+
+    startup: wall time per step before the first frame: open.
+    """
+
+    frame: float | None
+    images: tuple[ImageResult, ...]
+    startup: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        return tuple(path for image in self.images for path in image.paths)
+
+    @property
+    def skipped(self) -> bool:
+        return all(image.skipped for image in self.images)
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Wall time per step, of all images together."""
+        steps = dict.fromkeys(step for image in self.images for step in image.seconds)
+        return self.startup | {step: sum(image.seconds.get(step, 0.0) for image in self.images) for step in steps}
 
 
 class Renderer:
@@ -80,29 +103,24 @@ def run(job: RenderJob, *, command: str = "", renderer: Renderer | None = None) 
     """
     startup: dict[str, float] = {}
     with _timed(startup, "open"):
-        reader = _reader(job)
-    frames = job.frames or (reader.first_frame(),)
-    check_outputs(job, frames, reader.camera_name)
-    remove_leftovers(job, frames, reader.camera_name)
-    provenance = {"version": __version__, "command": command, "stage": job.stage.name} | job.composition.choices
-    fingerprint = Fingerprint(job)
+        opened = OpenJob(job)
+    shots = {frame: opened.shots(frame) for frame in opened.frames}
+    everything = [shot for those in shots.values() for shot in those]
+    check_outputs(everything)
+    remove_leftovers(everything)
     with nullcontext(renderer) if renderer else Renderer() as lent:
-        for frame in frames:
-            result = _render_frame(job, frame, reader, lent, provenance, fingerprint)
-            yield replace(result, seconds=startup | result.seconds)
+        for frame in opened.frames:
+            images = tuple(_render_image(shot, opened, lent, command) for shot in shots[frame])
+            yield FrameResult(frame, images, startup)
             startup = {}
 
 
-def frames_of(job: RenderJob) -> tuple[float | None, ...]:
-    """The frames that `run` renders. Raises StageError."""
-    return job.frames or (_reader(job).first_frame(),)
-
-
 def examine(job: RenderJob) -> tuple[Scene, Plan]:
-    """Read and plan the first frame; render nothing. Raises StageError, UsageError."""
-    reader = _reader(job)
-    scene = reader.read(job.frames[0] if job.frames else reader.first_frame())
-    return scene, make_plan(scene, job.settings)
+    """Read and plan the first image of the first frame; render nothing. Raises StageError, UsageError."""
+    opened = OpenJob(job)
+    shot = opened.shots(opened.frames[0])[0]
+    scene = opened.reader(shot.product).read(shot.frame)
+    return scene, make_plan(scene, shot.job.settings)
 
 
 def render(
@@ -122,60 +140,47 @@ def render(
     known = {f.name for f in fields(RenderSettings)}
     if unknown := sorted(options.keys() - known):
         raise UsageError(f"no render option named {', '.join(unknown)}; there are {', '.join(sorted(known))}")
-    settings = RenderSettings(**options)
-    settings = replace(settings, layers=resolve(settings.layers))
+    settings = RenderSettings(**{"layers": (BEAUTY,), **options})
     frames = (frame,) if frame is not None else ()
-    job = RenderJob(Path(stage), frames, camera, composition or Composition(), settings)
+    job = RenderJob(Path(stage), frames, camera, composition=composition or Composition(), settings=settings)
     with closing(run(job)) as results:
         result = next(results)
-    assert result.film is not None
-    return result.film
+    film = result.images[0].film
+    assert film is not None
+    return film
 
 
-def _reader(job: RenderJob) -> StageReader:
-    settings = job.settings
-    return StageReader(
-        open_stage(job.stage, job.composition, job.camera),
-        camera=job.camera,
-        purposes=settings.purposes,
-        complexity=settings.complexity,
-        size=settings.size,
-        width=settings.width,
-        extras=extras_of(settings.layers),
-    )
-
-
-def _render_frame(
-    job: RenderJob,
-    frame: float | None,
-    reader: StageReader,
-    renderer: Renderer,
-    provenance: dict[str, Any],
-    fingerprint: Fingerprint,
-) -> FrameResult:
-    files = frame_files(job, frame, reader.camera_name)
-    made_of = fingerprint.of(frame) if files else ""
+def _render_image(shot: Shot, opened: OpenJob, renderer: Renderer, command: str) -> ImageResult:
+    job, files = shot.job, shot_files(shot)
+    made_of = opened.fingerprint(shot) if files else ""
     if is_done(job, files, made_of):
-        return FrameResult(frame, files, skipped=True)
+        return ImageResult(files, skipped=True)
     seconds: dict[str, float] = {}
+    reader = opened.reader(shot.product)
     with _timed(seconds, "read"):
-        scene = reader.read(frame)
+        scene = reader.read(shot.frame)
     with _timed(seconds, "plan"):
         plan = make_plan(scene, job.settings)
     with _timed(seconds, "context"):
         pipeline = renderer.pipeline(job.device)
     with _timed(seconds, "draw"):
-        film = pipeline.render(scene, plan)
+        moments = plan_moments(scene, plan, reader.read_shutter(scene, plan.moments), job.settings)
+        film = pipeline.render(scene, plan, moments)
     with _timed(seconds, "write"):
-        film = replace(film, metadata=provenance | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of})
-        paths = frame_paths(job, frame, reader.camera_name)
-        written = tuple(file for path in paths for file in write(film, job.output, path))
-    return FrameResult(frame, written, film=film, plan=plan, seconds=seconds)
+        facts = _provenance(shot, command) | film.metadata | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of}
+        film = replace(film, metadata=facts)
+        written = tuple(file for path in shot_paths(shot) for file in write(film, job.output, path))
+    return ImageResult(written, film=film, plan=plan, seconds=seconds)
+
+
+def _provenance(shot: Shot, command: str) -> dict[str, Any]:
+    facts = {"version": __version__, "command": command, "stage": shot.job.stage.name}
+    product = {"product": shot.product.path} if shot.product.path else {}
+    return facts | product | shot.job.composition.choices
 
 
 def _cost(plan: Plan, seconds: float) -> dict[str, Any]:
     return {
-        "samples": plan.samples,
         "layout": plan.layout,
         "shading": plan.shading,
         "seconds": round(seconds, 4),

@@ -25,6 +25,8 @@ COMPRESSIONS: tuple[Compression, ...] = ("zip", "zips", "piz", "dwaa", "none")
 FILTERS: dict[Filter, float] = {"box": 1.0, "gaussian": 2.0, "blackman-harris": 3.0}
 """Widths in pixels, from end to end, where none is asked: those of Arnold."""
 BITS: tuple[Bits, ...] = (8, 16)
+MOST_SAMPLES = 4096
+"""Of a render that the error or the time ends."""
 PURPOSES = ("default", "render", "proxy", "guide")
 
 
@@ -83,38 +85,62 @@ class RenderSettings:
     width: pixels; the height then follows the camera's aspect. At most one of size and width is given.
     crop: (x, y, width, height) of the pixels that are rendered, from the image's top left corner, which they may leave;
         None follows the stage's RenderSettings, then the whole image.
-    samples: jittered samples a pixel; 1 is a sample at the pixel's centre.
+    samples: jittered samples a pixel, or the most of them; 1 is a sample at the pixel's centre. None is 1, or
+        MOST_SAMPLES where the error or the time ends the render.
+    max_error: relative standard error to render to: passes/convergence.py.
+    time_limit: seconds to draw a frame in; the sample that passes them is finished.
     cryptomatte_levels: ids a pixel of a Cryptomatte holds, the greatest coverage first; even.
     light_points: places on a light, in all samples together at least, where it looks large; 1 is its far field.
     filter: the samples of a pixel fall by it.  filter_width: pixels from end to end; None for the filter's own.
     render_space: the scene-linear colour space of the image, by a name that the OCIO config knows; None follows the
         stage's RenderSettings, then linear Rec.709.  ocio: the config, a file or ocio://NAME; empty for $OCIO's.
+    layers: names of the table in image/layers; None follows the stage's product, then the beauty alone.
+    purposes: of the geometry that is drawn; None follows the stage's RenderSettings, then default and render.
     exposure: stops added to the camera's own.
     shadows: False lights every surface that faces a light.
     complexity: how finely subdivision surfaces are refined: by their size in the image, or 0 to 3 levels all alike.
     background: dome lights are seen behind the geometry, and cover there.
+    motion_blur: several samples see as many moments of the camera's shutter.
     light_tolerance: scene-linear value that all dropped light together may reach in one pixel.
     """
 
     size: tuple[int, int] | None = None
     width: int | None = None
     crop: tuple[int, int, int, int] | None = None
-    samples: int = 1
+    samples: int | None = None
     light_points: int = 16
+    max_error: float | None = None
+    time_limit: float | None = None
     filter: Filter = "box"
     filter_width: float | None = None
     cryptomatte_levels: int = 6
     layout: Layout = "float"
     shading: Shading = "preview-surface"
-    layers: tuple[str, ...] = ("beauty",)
+    layers: tuple[str, ...] | None = None
     render_space: str | None = None
     ocio: str = ""
     exposure: float = 0.0
-    purposes: tuple[str, ...] = ("default", "render")
+    purposes: tuple[str, ...] | None = None
     light_tolerance: float = 1e-5
     shadows: bool = True
     complexity: Complexity = "auto"
     background: bool = True
+    motion_blur: bool = True
+
+    @property
+    def most_samples(self) -> int:
+        """`samples`, or what stands for it."""
+        open_ended = self.max_error is not None or self.time_limit is not None
+        return self.samples or (MOST_SAMPLES if open_ended else 1)
+
+
+@dataclass(frozen=True, slots=True)
+class NamedLayer:
+    """A layer as a file shall have it: under another name, and with its first `width` channels."""
+
+    layer: str
+    name: str
+    width: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +148,8 @@ class OutputSettings:
     """How a film becomes files.
 
     patterns: file names with frame and name tokens; the suffix picks the format. One file per pattern and frame.
+    fallback: the pattern where there are none and the stage's products have no names either; empty writes no file.
+    variables: what the stage's product has in a file, and under which names; empty has the layers as they are.
     display, view, look: of the OCIO config, for display-referred formats; None takes the config's default, and no look.
     full_float: 32-bit channels in EXR in place of half (data layers are always 32-bit).
     multipart: a part of the EXR for each layer.  tiled: EXR in tiles; mipmaps: in tiles with all smaller levels.
@@ -130,6 +158,8 @@ class OutputSettings:
     """
 
     patterns: tuple[str, ...] = ()
+    fallback: str = ""
+    variables: tuple[NamedLayer, ...] = ()
     existing: Existing = "overwrite"
     display: str | None = None
     view: str | None = None
@@ -151,12 +181,16 @@ class RenderJob:
 
     frames: USD time codes, None standing for the default time; empty means the stage's first frame.
     camera: prim path or name; None picks by the rule in usd/camera.py.
+    render_settings: path of a RenderSettings or RenderPass prim; None finds one as usd/products.py does.
+    product: path or name of a product of theirs; None makes all that the output's names can hold.
     device: EGL device index, None for the driver's default.
     """
 
     stage: Path
     frames: tuple[float | None, ...] = ()
     camera: str | None = None
+    render_settings: str | None = None
+    product: str | None = None
     composition: Composition = field(default_factory=Composition)
     settings: RenderSettings = field(default_factory=RenderSettings)
     output: OutputSettings = field(default_factory=OutputSettings)

@@ -26,6 +26,14 @@ in vec4 uv;
 #ifdef LAYER_UV
 in vec2 layer_uv;
 #endif
+#ifdef PRIMVARS
+in mat4 primvars;
+#endif
+#ifdef MOTION
+in vec4 clip_before;
+in vec4 clip_now;
+in vec4 clip_after;
+#endif
 #ifdef DRAW_ROW
 flat in uint visible_row;
 #endif
@@ -63,6 +71,12 @@ Detail detail_of(vec3 normal) {
 #ifdef PLANE_TANGENT
     Coordinates c = Coordinates(layer_uv, dFdx(layer_uv), dFdy(layer_uv));
     d.tangent = tangent_across(normal, along_coordinates(dFdx(position_relative), dFdy(position_relative), c)[0]);
+#endif
+#ifdef PRIMVARS
+    d.primvars = primvars;
+#endif
+#ifdef PLANE_MOTION
+    d.motion = vec4(pixels_between(clip_now, clip_before, view.size), pixels_between(clip_now, clip_after, view.size));
 #endif
 #ifdef PLANE_VISIBLE
     d.visible = uvec2(visible_row + 1u, uint(gl_PrimitiveID));

@@ -14,6 +14,18 @@ in vec4 vertex_uv;             // two sets
 in vec2 vertex_layer_uv;
 out vec2 layer_uv;
 #endif
+#ifdef PRIMVARS
+in mat4 vertex_primvars;
+out mat4 primvars;
+#endif
+#ifdef MOTION
+layout(std430, binding = 8) readonly buffer MotionBlock { Motion motions[]; };
+in vec3 position_before;
+in vec3 position_after;
+out vec4 clip_before;
+out vec4 clip_now;
+out vec4 clip_after;
+#endif
 #ifdef DRAW_ROW
 in uint draw_row;
 flat out uint visible_row;
@@ -58,6 +70,15 @@ void main() {
 #endif
 #ifdef LAYER_UV
     layer_uv = vertex_layer_uv;
+#endif
+#ifdef PRIMVARS
+    primvars = vertex_primvars;
+#endif
+#ifdef MOTION
+    Motion motion = motions[draw.x];
+    clip_before = motion.clip_before_from_object * vec4(position_before, 1.0);
+    clip_now = motion.clip_now_from_object * vec4(position_object, 1.0);
+    clip_after = motion.clip_after_from_object * vec4(position_after, 1.0);
 #endif
 #ifdef DRAW_ROW
     visible_row = draw_row;

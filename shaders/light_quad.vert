@@ -1,10 +1,11 @@
-// A distant light: one triangle that covers the screen.
+// A distant light: every region of the screen, as shaders/screen.vert draws them.
+in vec4 region;
 flat out uint light_index;
 
 uniform uint first_light;
 
 void main() {
-    vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0;
-    light_index = first_light + uint(gl_InstanceID);
-    gl_Position = vec4(corner, 0.0, 1.0);
+    vec2 corner = mix(region.xy, region.zw, vec2(gl_VertexID & 1, gl_VertexID >> 1));
+    light_index = first_light;
+    gl_Position = vec4(2.0 * corner.x - 1.0, 1.0 - 2.0 * corner.y, 0.0, 1.0);
 }

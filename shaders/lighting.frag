@@ -65,7 +65,11 @@ void main() {
     lit.sent = dot(irradiance, vec3(1.0)) * max(dot(surface.normal, l), 0.0);
     lit.volumes = 1.0;
     lit.visible = visibility(lights[light_index], position, l);
+#ifdef SHADOW_STYLES
+    irradiance *= mix(lights[light_index].shadow_color, vec3(1.0), lit.visible);
+#else
     irradiance *= lit.visible;
+#endif
     float widening = patch_alpha_squared(lights[light_index], position, l) + pixel_alpha_squared(surface, pixel);
     if (widening > 0.0) {
         surface.roughness = widened_roughness(surface.roughness, widening);

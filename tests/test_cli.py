@@ -298,11 +298,12 @@ def test_stats_record_what_was_done() -> None:
     frame = record["frames"][0]
     assert record["version"] == __version__
     assert record["job"]["settings"]["size"] == [16, 8]
-    assert frame["paths"] == ["triangle.exr"]
     assert {"read", "draw", "write"} <= frame["seconds"].keys()
-    assert frame["decisions"]
-    assert frame["layers"]["depth"]["min"] == pytest.approx([10.0], rel=1e-5)
-    assert 0.0 < frame["layers"]["depth"]["finite"] < 1.0
+    (image,) = frame["images"]
+    assert image["paths"] == ["triangle.exr"]
+    assert image["decisions"]
+    assert image["layers"]["depth"]["min"] == pytest.approx([10.0], rel=1e-5)
+    assert 0.0 < image["layers"]["depth"]["finite"] < 1.0
 
 
 def test_inspect_shows_what_is_there() -> None:

@@ -170,7 +170,7 @@ def test_subsets_draw_their_own_triangles(pipeline: Pipeline) -> None:
 
 
 def test_instances_bear_their_own_colour_and_vertices_theirs(pipeline: Pipeline) -> None:
-    shown = Material("/shown", uses_display_color=True)
+    shown = Material("/shown", uses_display_color=True, uses_display_opacity=True)
     varying = replace(quad(0.4), display_color=np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], np.float32))
     left, right = translation(np.array([-1.0, 0, 0])), translation(np.array([1.0, 0, 0]))
     constant = replace(drawable(quad(0.4), 0, where=[left]), display_color=np.array([[0.2, 0.4, 0.6]], np.float32))

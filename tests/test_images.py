@@ -22,7 +22,7 @@ from defshade_cli.image.files import write
 from defshade_cli.image.film import Film
 from defshade_cli.image.reading import read
 from defshade_cli.passes.pipeline import Pipeline
-from defshade_cli.plan import make_plan
+from defshade_cli.plan import make_plan, plan_moments
 from defshade_cli.settings import OutputSettings, RenderSettings
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.stage import open_stage
@@ -44,6 +44,7 @@ CASES: dict[str, tuple[str, float | None, RenderSettings]] = {
     "subdivision.low": ("subdivision", None, replace(SETTINGS, complexity="low")),
     "light_rect_texture.32": ("light_rect_texture", None, replace(SETTINGS, samples=32)),
     "light_rect.points": ("light_rect", None, RenderSettings(size=(160, 90))),
+    "motion_blur.16": ("motion_blur", 4.0, replace(SETTINGS, samples=16)),
     "showcase.8": ("showcase", None, replace(SETTINGS, samples=8)),
 }
 """Reference → stage, frame, settings."""
@@ -91,7 +92,9 @@ def _draw(pipeline: Pipeline, stage: str, frame: float | None, settings: RenderS
     opened = open_stage(resources.SCENES / f"{stage}.usda")
     reader = StageReader(opened, purposes=settings.purposes, complexity=settings.complexity, size=settings.size)
     scene = reader.read(reader.first_frame() if frame is None else frame)
-    return pipeline.render(scene, make_plan(scene, settings))
+    plan = make_plan(scene, settings)
+    moments = plan_moments(scene, plan, reader.read_shutter(scene, plan.moments), settings)
+    return pipeline.render(scene, plan, moments)
 
 
 def _outliers(image: NDArray, reference: NDArray) -> float:

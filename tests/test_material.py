@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -152,8 +153,47 @@ def test_a_reader_of_display_color_is_understood() -> None:
 def test_a_reader_of_another_primvar_falls_back() -> None:
     fallback = "float3 inputs:fallback = (1, 0, 0)"
     text = surface("m", DIFFUSE_FROM_READER, READER.format(type="float3", name="paint", fallback=fallback))
-    assert of_cube(text) == Material("/m", diffuse_color=(1, 0, 0))
-    assert issues(text) == ["not read: diffuseColor (primvar paint)"]
+    assert of_cube(text) == Material("/m", (1, 0, 0), uses_display_color=True, color_primvar="paint")
+    assert issues(text) == []
+    assert colors_of(text, "") == [[1, 0, 0]]
+
+
+def colors_of(material: str, primvars: str) -> list[list[float]]:
+    """What a cube with `primvars` is drawn in."""
+    scene = read(f'{material}\ndef Cube "cube" {BINDS} {{\n{primvars}\nrel material:binding = </m>\n}}')
+    return scene.drawables[0].display_color.tolist()
+
+
+def test_any_primvar_can_be_the_colour_also_through_an_interface() -> None:
+    reader = READER.format(type="float3", name="unused", fallback="").replace(
+        'string inputs:varname = "unused"', "string inputs:varname.connect = </m.inputs:set>"
+    )
+    text = surface("m", DIFFUSE_FROM_READER, reader).replace("{", '{\nstring inputs:set = "paint"', 1)
+    primvars = """color3f[] primvars:paint = [(0, 1, 0)]
+        color3f[] primvars:displayColor = [(0, 0, 1)]"""
+    assert colors_of(text, primvars) == [[0, 1, 0]]
+    assert issues(text) == []
+
+
+def test_a_colour_primvar_may_vary_over_the_mesh() -> None:
+    reader = READER.format(type="float3", name="paint", fallback="")
+    mesh = f"""def Mesh "mesh" {BINDS} {{
+        uniform token subdivisionScheme = "none"
+        int[] faceVertexCounts = [3]
+        int[] faceVertexIndices = [0, 1, 2]
+        point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0)]
+        color3f[] primvars:paint = [(1, 0, 0), (0, 1, 0), (0, 0, 1)] (interpolation = "vertex")
+        rel material:binding = </m>
+    }}"""
+    (drawn,) = read(surface("m", DIFFUSE_FROM_READER, reader) + mesh).meshes
+    assert drawn.display_color is not None
+    np.testing.assert_array_equal(drawn.display_color, np.eye(3))
+
+
+def test_display_color_leaves_the_opacity_alone() -> None:
+    reader = READER.format(type="float3", name="displayColor", fallback="")
+    found = of_cube(surface("m", f"{DIFFUSE_FROM_READER}\nfloat inputs:opacity = 0.5", reader))
+    assert (found.uses_display_color, found.uses_display_opacity, found.opacity) == (True, False, 0.5)
 
 
 def test_a_texture_falls_back_channel_by_channel() -> None:
@@ -255,7 +295,7 @@ def test_occlusion_is_nothing_to_report() -> None:
     ],
 )
 def test_what_is_not_understood_is_reported_and_drawn_as_unbound(material: str, reason: str) -> None:
-    assert of_cube(material) == Material("/m", uses_display_color=True)
+    assert of_cube(material) == replace(UNBOUND, path="/m")
     assert issues(material) == [reason]
 
 

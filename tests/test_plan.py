@@ -108,6 +108,6 @@ def test_opacity_decides_the_cutout() -> None:
     assert choices()["cutout"] == "skipped"
     thin = replace(SCENE, materials=(replace(GREY, opacity=0.5),))
     assert make_plan(thin, RenderSettings()).cutout
-    unbound = replace(GREY, uses_display_color=True)
+    unbound = replace(GREY, uses_display_color=True, uses_display_opacity=True)
     see_through = replace(drawable(quad()), display_opacity=np.array([0.5], np.float32))
     assert make_plan(scene([quad()], [], [unbound], drawables=[see_through]), RenderSettings()).cutout

@@ -10,7 +10,7 @@ import pytest
 from defshade_cli.cli.options import Reporting
 from defshade_cli.cli.progress import Progress, frame_name, make_progress
 from defshade_cli.errors import StageError
-from defshade_cli.render import FrameResult
+from defshade_cli.render import FrameResult, ImageResult
 
 PROTOCOLS = {
     "alf": ["ALF_PROGRESS 0%", "ALF_PROGRESS 33%", "ALF_PROGRESS 66%", "ALF_PROGRESS 100%"],
@@ -29,7 +29,8 @@ PROTOCOLS = {
 
 
 def _result(frame: float, **fields: bool) -> FrameResult:
-    return FrameResult(frame, (Path(f"f.{frame:g}.exr"),), seconds={"read": 0.25, "draw": 0.5}, **fields)
+    image = ImageResult((Path(f"f.{frame:g}.exr"),), seconds={"read": 0.25, "draw": 0.5}, **fields)
+    return FrameResult(frame, (image,))
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)

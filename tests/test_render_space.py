@@ -14,7 +14,8 @@ import pytest
 from defshade_cli import render
 from defshade_cli.errors import UsageError
 from defshade_cli.image import files
-from defshade_cli.image.render_space import REC709, find_render_space
+from defshade_cli.image.ocio import find_render_space
+from defshade_cli.image.render_space import REC709
 from defshade_cli.settings import OutputSettings
 from films import film
 

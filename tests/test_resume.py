@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from defshade_cli.farm.fingerprint import Fingerprint
+from defshade_cli.farm.open_job import OpenJob
 from defshade_cli.farm.targets import FINGERPRINT
 from defshade_cli.image.files import remove_abandoned, write
 from defshade_cli.image.reading import read_header
@@ -108,7 +109,8 @@ def test_a_copied_folder_with_new_dates_is_the_same(folder: Path) -> None:
 def test_only_stale_frames_are_rendered_again(renderer: Renderer) -> None:
     plain = replace(JOB, stage=Path("plain.usda"))
     assert rendered(JOB, renderer) == rendered(plain, renderer) == [1.0, 2.0]
-    assert read_header(Path("out/shot.1.png"))[FINGERPRINT] == fingerprint(JOB)
+    opened = OpenJob(JOB)
+    assert read_header(Path("out/shot.1.png"))[FINGERPRINT] == opened.fingerprint(*opened.shots(1.0))
     assert not rendered(JOB, renderer)
     Path("parts/paint.png").write_bytes(b"tan")
     assert rendered(JOB, renderer) == [1.0, 2.0]
@@ -132,9 +134,10 @@ def test_a_stage_with_an_unreadable_part_is_rendered_and_never_finished(renderer
 
 def test_a_thousand_finished_frames_are_skipped_in_seconds(renderer: Renderer) -> None:
     job = replace(JOB, frames=tuple(map(float, range(1, 1001))), output=OutputSettings(("o/#.exr",), existing="skip"))
-    keys = Fingerprint(job)
+    opened = OpenJob(job)
     for frame in job.frames:
-        made = film("beauty", size=(16, 9), metadata={FINGERPRINT: keys.of(frame)})
+        (shot,) = opened.shots(frame)
+        made = film("beauty", size=(16, 9), metadata={FINGERPRINT: opened.fingerprint(shot)})
         write(made, job.output, Path(f"o/{frame:.0f}.exr"))
     start = time.perf_counter()
     assert not rendered(job, renderer)

@@ -11,7 +11,8 @@ import click
 from defshade_cli.cli.types import Crop, Size
 from defshade_cli.settings import Composition, OutputSettings, RenderJob, RenderSettings
 
-_NOT_OPTIONS = {"stage", "frames", "composition", "session_layers", "settings", "output", "patterns"}
+_OWNERS = {"composition", "settings", "output"}
+_NOT_OPTIONS = _OWNERS | {"stage", "frames", "session_layers", "patterns", "fallback", "variables"}
 
 
 def option_arguments(job: RenderJob, params: Iterable[click.Parameter]) -> list[str]:

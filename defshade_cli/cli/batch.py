@@ -229,7 +229,7 @@ def _task_line(chunk: Chunk) -> str:
     job = chunk.job
     frames = ",".join(frame_name(frame) for frame in job.frames) or "first frame"
     camera = f"  camera {job.camera}" if job.camera else ""
-    return f"{job.stage}{camera}  frames {frames}  → {', '.join(job.output.patterns)}"
+    return f"{job.stage}{camera}  frames {frames}  → {', '.join(job.output.patterns or (job.output.fallback,))}"
 
 
 @contextmanager

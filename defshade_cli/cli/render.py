@@ -56,5 +56,5 @@ def execute(job: RenderJob, reporting: Reporting) -> None:
 
 def _log_details(result: FrameResult) -> None:
     log.info("frame %s: %s", frame_name(result.frame), ", ".join(f"{k} {v:.3f} s" for k, v in result.seconds.items()))
-    for decision in result.plan.decisions if result.plan else ():
+    for decision in (decision for image in result.images if image.plan for decision in image.plan.decisions):
         log.info("%s: %s, %s", decision.subject, decision.choice, decision.reason)

@@ -16,7 +16,7 @@ from defshade_cli.settings import RenderJob
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from defshade_cli.render import FrameResult
+    from defshade_cli.render import FrameResult, ImageResult
 
 
 class Stats:
@@ -67,18 +67,18 @@ def plain(value: Any) -> Any:
 
 
 def _frame_figures(result: FrameResult) -> dict[str, Any]:
-    figures: dict[str, Any] = {
-        "frame": result.frame,
-        "paths": result.paths,
-        "skipped": result.skipped,
-        "seconds": result.seconds,
-    }
-    film = result.film
+    images = [_image_figures(image) for image in result.images]
+    return {"frame": result.frame, "seconds": result.seconds, "images": images}
+
+
+def _image_figures(image: ImageResult) -> dict[str, Any]:
+    figures: dict[str, Any] = {"paths": image.paths, "skipped": image.skipped}
+    film = image.film
     if film is None:
         return figures
     layers = {name: _layer_figures(pixels) for name, pixels in film.layers.items()}
     figures |= {"size": film.size, "camera": film.camera.path, "film": film.metadata, "layers": layers}
-    return figures | {"decisions": result.plan.decisions if result.plan else ()}
+    return figures | {"decisions": image.plan.decisions if image.plan else ()}
 
 
 def _layer_figures(pixels: NDArray) -> dict[str, Any]:

@@ -46,7 +46,7 @@ class Fingerprint:
         except (StageError, OSError) as error:
             log.info("its frames will never count as finished: %s", error)
             return None
-        output = replace(self._job.output, patterns=(), existing="overwrite")
+        output = replace(self._job.output, patterns=(), fallback="", existing="overwrite")
         composition = replace(self._job.composition, session_layers=tuple(Path(layer.name) for layer in layers))
         stage = Path(self._job.stage.name)
         job = replace(self._job, stage=stage, composition=composition, frames=(), device=None, output=output)

@@ -3,7 +3,8 @@
     ####  ###.##       the frame, zero-padded to the placeholder's whole width; hashes after the dot are decimals
     %04d  %d           the same with C's habits             $F4  $F    with Houdini's
     {frame}            the frame as short as it goes: 12, 12.5
-    {scene}  {camera}  names made safe: a prim path /World/Cam becomes World_Cam
+    {scene}  {camera}  {product}
+                       names made safe: a prim path /World/Cam becomes World_Cam
 
 Hashes follow usdrecord (UsdAppUtils' frame placeholders): `###.##` writes frame 1.5 as 001.50.
 """
@@ -24,21 +25,27 @@ def has_frame_token(pattern: str) -> bool:
     return any(_is_frame(token) for token in _TOKEN.finditer(pattern))
 
 
-def expand(pattern: str, *, frame: float | None, scene: str, camera: str) -> Path:
+def has_product_token(pattern: str) -> bool:
+    """Whether each of a stage's products gets a file of its own."""
+    return any(token["name"] == "product" for token in _TOKEN.finditer(pattern))
+
+
+def expand(pattern: str, *, frame: float | None, scene: str, camera: str, product: str = "") -> Path:
     """The path that `pattern` names for this frame.
 
+    product: empty for a stage that names none; its file is then called beauty.
     frame: None at the default time, which has no number.
     Raises UsageError for an unknown {name}, a frame token without a frame, and a frame with more decimals
     than its token has places.
     """
-    names = {"scene": scene, "camera": camera}
+    names = {"scene": scene, "camera": camera, "product": product or "beauty"}
 
     def text(token: re.Match[str]) -> str:
         if _is_frame(token):
             return _frame_text(token, frame)
         name = token["name"]
         if name not in names:
-            raise UsageError(f"'{pattern}': {{{name}}} is none of {{scene}}, {{camera}}, {{frame}}")
+            raise UsageError(f"'{pattern}': {{{name}}} is none of {{scene}}, {{camera}}, {{product}}, {{frame}}")
         return safe_name(names[name])
 
     return Path(_TOKEN.sub(text, pattern))

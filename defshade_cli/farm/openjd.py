@@ -70,7 +70,7 @@ def make_template(jobs: Iterable[tuple[RenderJob, Sequence[str]]]) -> dict[str, 
     """
     groups: dict[_Group, list[Path]] = {}
     for job, options in jobs:
-        layers, patterns = job.composition.session_layers, job.output.patterns
+        layers, patterns = job.composition.session_layers, job.output.patterns or (job.output.fallback,)
         group = _Group(job.frames, layers, tuple(options), patterns, job.stage.is_absolute())
         groups.setdefault(group, []).append(job.stage)
     parts = [

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from defshade_cli.errors import OutputError, UsageError
 from defshade_cli.farm.names import expand, has_frame_token
+from defshade_cli.farm.shots import Shot
 from defshade_cli.image.colour import display_transform
 from defshade_cli.image.encoders import EXR, check_format, suffix_of
 from defshade_cli.image.files import check_writable, remove_abandoned, targets
@@ -14,48 +15,53 @@ from defshade_cli.image.reading import read_header
 from defshade_cli.image.render_space import RenderSpace
 from defshade_cli.settings import RenderJob
 
-Frames = Sequence[float | None]
-
 FINGERPRINT = "fingerprint"
 """The name of farm.fingerprint's text in a file's header, among the provenance."""
 
 
-def frame_paths(job: RenderJob, frame: float | None, camera: str) -> tuple[Path, ...]:
-    """The job's patterns with the frame, the stage's and the camera's name filled in. Raises UsageError."""
-    return tuple(expand(p, frame=frame, scene=job.stage.stem, camera=camera) for p in job.output.patterns)
+def shot_paths(shot: Shot) -> tuple[Path, ...]:
+    """The job's patterns with the frame, and the names of stage, camera and product filled in. Raises UsageError."""
+    names = {"scene": shot.job.stage.stem, "camera": shot.camera, "product": shot.product.name}
+    return tuple(expand(pattern, frame=shot.frame, **names) for pattern in shot.job.output.patterns)
 
 
-def frame_files(job: RenderJob, frame: float | None, camera: str) -> tuple[Path, ...]:
-    """Every file that one frame becomes, layers apart included. Raises UsageError."""
-    paths = frame_paths(job, frame, camera)
-    return tuple(file for path in paths for file in targets(job.settings.layers, job.output, path))
+def shot_files(shot: Shot) -> tuple[Path, ...]:
+    """Every file that a shot becomes, layers apart included. Raises UsageError."""
+    layers = shot.job.settings.layers or ()
+    return tuple(file for path in shot_paths(shot) for file in targets(layers, shot.job.output, path))
 
 
-def check_outputs(job: RenderJob, frames: Frames, camera: str) -> None:
-    """Say before the first frame what would go wrong after it.
+def check_outputs(shots: Sequence[Shot]) -> None:
+    """Say before the first of a job's shots what would go wrong after it.
 
     Raises UsageError for names that collide, unknown suffixes, displays and views; OutputError for folders that
     cannot be written.
     """
-    for pattern in job.output.patterns:
-        if len(frames) > 1 and not has_frame_token(pattern):
-            raise UsageError(f"{len(frames)} frames would overwrite each other in {pattern}; put #### in its name")
-    files = [file for frame in frames for file in frame_files(job, frame, camera)]
+    frames = len({shot.frame for shot in shots})
+    for pattern in {pattern for shot in shots for pattern in shot.job.output.patterns}:
+        if frames > 1 and not has_frame_token(pattern):
+            raise UsageError(f"{frames} frames would overwrite each other in {pattern}; put #### in its name")
+    files = [file for shot in shots for file in shot_files(shot)]
     if len(set(files)) < len(files):
         twice = next(file for file in files if files.count(file) > 1)
         raise UsageError(f"two outputs would be written to {twice}")
+    for job in {shot.product: shot.job for shot in shots}.values():
+        _check_formats(files, job)
+    for folder_file in {file.parent: file for file in files}.values():
+        check_writable(folder_file)
+
+
+def _check_formats(files: Sequence[Path], job: RenderJob) -> None:
     for file in files:
         check_format(file, job.output)
     if any(suffix_of(file) != EXR for file in files):
         space = RenderSpace(config=job.settings.ocio)
         display_transform(job.output.display, job.output.view, job.output.look, space)
-    for folder_file in {file.parent: file for file in files}.values():
-        check_writable(folder_file)
 
 
-def remove_leftovers(job: RenderJob, frames: Frames, camera: str) -> None:
-    """Clear the folders of the job's files of what killed renders left half written. Raises OutputError."""
-    for folder in {file.parent for frame in frames for file in frame_files(job, frame, camera)}:
+def remove_leftovers(shots: Sequence[Shot]) -> None:
+    """Clear the folders of the shots' files of what killed renders left half written. Raises OutputError."""
+    for folder in {file.parent for shot in shots for file in shot_files(shot)}:
         remove_abandoned(folder)
 
 

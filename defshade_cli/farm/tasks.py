@@ -8,7 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from defshade_cli.errors import UsageError
-from defshade_cli.farm.targets import check_outputs, frame_files, remove_leftovers
+from defshade_cli.farm.shots import Shot, make_shot
+from defshade_cli.farm.targets import check_outputs, remove_leftovers, shot_files
+from defshade_cli.scene.product import Product
 from defshade_cli.settings import RenderJob
 
 LARGEST_CHUNK = 16
@@ -87,9 +89,9 @@ def check_batch(jobs: Sequence[RenderJob]) -> None:
     """
     writers: dict[Path, RenderJob] = {}
     for job in jobs:
-        frames = job.frames or (0.0,)  # the first frame is the stage's to know
-        check_outputs(job, frames, job.camera or "camera")
-        for file in (file for frame in frames for file in frame_files(job, frame, job.camera or "camera")):
+        shots = _expected_shots(job)
+        check_outputs(shots)
+        for file in (file for shot in shots for file in shot_files(shot)):
             other = writers.setdefault(file, job)
             if other is not job:
                 raise UsageError(f"{other.stage} and {job.stage} would both be written to {file}; put {{scene}} in -o")
@@ -102,7 +104,12 @@ def leaving_no_leftovers(jobs: Sequence[RenderJob]) -> Iterator[None]:
         yield
     finally:
         for job in jobs:
-            remove_leftovers(job, job.frames or (0.0,), job.camera or "camera")
+            remove_leftovers(_expected_shots(job))
+
+
+def _expected_shots(job: RenderJob) -> list[Shot]:
+    """The shots of a stage that is not open yet: its first frame, its cameras and its products are its own to know."""
+    return [make_shot(job, frame, Product(), job.camera or "camera") for frame in job.frames or (0.0,)]
 
 
 def _parts(job: RenderJob, size: int) -> Iterator[RenderJob]:

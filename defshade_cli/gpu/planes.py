@@ -13,6 +13,9 @@ from dataclasses import dataclass
 from defshade_cli.scene.material import Material
 from defshade_cli.settings import Layout
 
+MOST_PRIMVARS = 4
+"""Primvars that layers can show at a time: a vertex has four numbers of each."""
+
 MOST_TARGETS = 8
 """Colour attachments that every OpenGL 4.5 has."""
 
@@ -139,6 +142,8 @@ PLANES: tuple[Plane, ...] = (
     _detail("tangent", 4, "vec4(d.tangent, 0.0)", "POSITION", "LAYER_UV"),
     _detail("uv", 2, "vec4(d.uv, 0.0, 0.0)", "LAYER_UV"),
     _detail("occlusion", 1, "vec4(d.occlusion)"),
+    *(_detail(f"primvar_{i}", 4, f"d.primvars[{i}]", "PRIMVARS") for i in range(MOST_PRIMVARS)),
+    _detail("motion", 4, "d.motion", "MOTION"),
     _detail("visible", 2, "uvec4(d.visible, 0u, 0u)", "DRAW_ROW", dtype="u4"),
 )
 

@@ -19,7 +19,7 @@ from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 
-VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS, TEXTURE_INPUTS, TILES, LINKS = range(8)
+VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS, TEXTURE_INPUTS, TILES, LINKS, MOTIONS = range(9)
 """Binding points of the storage buffers, as the shaders declare them."""
 
 INDICES_IN_POOL = 2
@@ -90,11 +90,20 @@ class GpuScene:
         self._made_for: tuple = ()
         self._pool: list[moderngl.Buffer] = []
         self._draws: list[moderngl.Buffer] = []
+        self._moved: list[moderngl.Buffer] = []
 
-    def update(self, scene: Scene, inputs: Collection[str] = ()) -> DrawList:
+    def update(
+        self,
+        scene: Scene,
+        inputs: Collection[str] = (),
+        moved: Sequence[NDArray[np.float32]] = (),
+        primvars: tuple[str, ...] = (),
+    ) -> DrawList:
         """Make the scene's geometry, placements and materials resident, relative to its camera.
 
         inputs: what layers read of the vertices, as gpu.planes.Plane.inputs names it.
+        moved: (V, 3) points of all meshes a frame before and after, where MOTION is among them.
+        primvars: names of those that layers show, at most MOST_PRIMVARS.
         """
         layer_uv = "LAYER_UV" in inputs
         self._instances.write(instance_records(scene.drawables, scene.camera.position))
@@ -102,8 +111,10 @@ class GpuScene:
         color_varies = any(m.display_color is not None or m.display_opacity is not None for m in scene.meshes)
         textured = bool(textures.arrays)
         uvs = uv_names(scene.drawables, scene.materials, len(scene.meshes)) if textured else ()
-        made_for = (uvs, color_varies, textured, layer_uv)
-        arrays_of = partial(vertex_arrays, color_varies=color_varies, textured=textured, layer_uv=layer_uv)
+        made_for = (uvs, color_varies, textured, layer_uv, primvars)
+        arrays_of = partial(
+            vertex_arrays, color_varies=color_varies, textured=textured, layer_uv=layer_uv, primvars=primvars
+        )
         if made_for == self._made_for and _are_alike(self._meshes, scene.meshes):
             self._overwrite(scene.meshes, lambda number: arrays_of([scene.meshes[number]], uvs[number : number + 1]))
         else:
@@ -115,8 +126,11 @@ class GpuScene:
         positions, normals, indices, *varying = self._pool
         vertices = [(positions, "3f", "position_object"), (normals, "3f", "normal_object")]
         names = [("4f", "vertex_color")] * color_varies + [("4f", "vertex_uv")] * textured
-        names += [("2f", "vertex_layer_uv")] * layer_uv
+        names += [("2f", "vertex_layer_uv")] * layer_uv + [("16f", "vertex_primvars")] * bool(primvars)
         vertices += [(buffer, *name) for buffer, name in zip(varying, names, strict=True)]
+        self._moved = self._replaced(self._moved, moved)
+        moments = ("position_before", "position_after")[: len(moved)]
+        vertices += [(buffer, "3f", name) for buffer, name in zip(self._moved, moments, strict=True)]
         vertices.append((self._draws[1], "2u4/i", "draw"))
         vertices += [(buffer, "1u4/i", "draw_row") for buffer in self._draws[2:]]
         corners = command_corners(scene)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.gpu.planes import MOST_PRIMVARS
 from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.material import UV_SETS, Material
 
@@ -24,7 +25,13 @@ def uv_names(drawables: Sequence[Drawable], materials: Sequence[Material], count
 
 
 def vertex_arrays(
-    meshes: Sequence[Mesh], uvs: Sequence[UvNames], *, color_varies: bool, textured: bool, layer_uv: bool = False
+    meshes: Sequence[Mesh],
+    uvs: Sequence[UvNames],
+    *,
+    color_varies: bool,
+    textured: bool,
+    layer_uv: bool = False,
+    primvars: Sequence[str] = (),
 ) -> list[NDArray]:
     """Positions, normals and indices; colours a vertex and texture coordinates where they are asked for."""
     arrays = [
@@ -38,6 +45,8 @@ def vertex_arrays(
         arrays.append(_joined([_vertex_uvs(m, names) for m, names in zip(meshes, uvs, strict=True)], 2 * UV_SETS))
     if layer_uv:
         arrays.append(_joined([_layer_uvs(m) for m in meshes], 2))
+    if primvars:
+        arrays.append(_joined([_vertex_primvars(m, primvars) for m in meshes], 4 * MOST_PRIMVARS))
     return arrays
 
 
@@ -69,3 +78,13 @@ def _layer_uvs(mesh: Mesh) -> NDArray[np.float32]:
     """(V, 2) the primvar st, else the first set that there is, else 0."""
     sets = [mesh.uvs[name] for name in ("st", *mesh.uvs) if name in mesh.uvs]
     return sets[0] if sets else np.zeros((len(mesh.points), 2), np.float32)
+
+
+def _vertex_primvars(mesh: Mesh, names: Sequence[str]) -> NDArray[np.float32]:
+    """(V, 16) four numbers of each primvar one after another, 0 for what the mesh lacks."""
+    values = np.zeros((len(mesh.points), 4 * MOST_PRIMVARS), np.float32)
+    for number, name in enumerate(names):
+        if name in mesh.primvars:
+            width = mesh.primvars[name].shape[1]
+            values[:, 4 * number : 4 * number + width] = mesh.primvars[name]
+    return values

@@ -1,4 +1,4 @@
-"""Skies of dome lights, from latitude-longitude images."""
+"""Skies of dome lights, from images."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from defshade_cli.errors import OutputError
-from defshade_cli.scene.environment import Environment, uniform_environment
+from defshade_cli.image.projections import latlong_from
+from defshade_cli.scene.environment import Environment, SkyLayout, uniform_environment
 from defshade_cli.scene.light import DomeLight
 
 log = logging.getLogger("defshade")
@@ -28,25 +29,25 @@ def sky_of(light: DomeLight) -> Environment:
     if not light.texture:
         return _EVEN
     try:
-        return read_environment(Path(light.texture))
+        return read_environment(Path(light.texture), light.layout)
     except OutputError as error:
         log.warning("%s: %s; its sky is even", light.path, error)
         return _EVEN
 
 
-def read_environment(path: Path) -> Environment:
+def read_environment(path: Path, layout: SkyLayout = "automatic") -> Environment:
     """The sky in an image, scene-linear Rec. 709; 8-bit images count as sRGB.
 
     Read once as long as the file does not change. Raises OutputError where the file cannot be read.
     """
     try:
-        return _read(str(path), path.stat().st_mtime_ns)
+        return _read(str(path), layout, path.stat().st_mtime_ns)
     except OSError as error:
         raise OutputError(f"{path} cannot be read: {error.strerror}") from error
 
 
 @lru_cache(maxsize=8)
-def _read(path: str, _changed: int) -> Environment:
+def _read(path: str, layout: SkyLayout, _changed: int) -> Environment:
     image = oiio.ImageBuf(path)
     if image.has_error or not image.spec().nchannels:
         raise OutputError(f"{path} cannot be read: {image.geterror()}")
@@ -56,7 +57,7 @@ def _read(path: str, _changed: int) -> Environment:
         image = oiio.ImageBufAlgo.resize(image, filtername="box", roi=oiio.ROI(0, _WIDEST, 0, height))
     pixels = _rgb(np.asarray(image.get_pixels(oiio.FLOAT)))
     pixels = np.where(np.isfinite(pixels), np.maximum(pixels, 0.0), 0.0)
-    return Environment(_linear_from_srgb(pixels) if is_display_referred else pixels)
+    return Environment(latlong_from(_linear_from_srgb(pixels) if is_display_referred else pixels, layout))
 
 
 def _rgb(pixels: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -28,12 +28,16 @@ from defshade_cli.settings import OutputSettings
 
 def targets(layers: Iterable[str], output: OutputSettings, path: Path) -> dict[Path, tuple[str, ...]]:
     """The files that `write` makes for `path`, each with the layers in it. Raises UsageError for an unknown suffix."""
-    names = in_order(layers)
+    names, main = tuple(layers), BEAUTY
+    if output.variables:
+        names = tuple(v.name for v in output.variables)
+        main = next((v.name for v in output.variables if v.layer == BEAUTY), names[0])
     if not output.split_layers and (suffix_of(path) == EXR or len(names) == 1):
         return {path: names}
-    beside = {name: path.with_name(f"{path.stem}.{LAYERS[name].exr_name}{path.suffix}") for name in names}
-    if not output.split_layers and BEAUTY in beside:
-        beside[BEAUTY] = path
+    labels = {name: name if output.variables else LAYERS[name].exr_name for name in names}
+    beside = {name: path.with_name(f"{path.stem}.{label}{path.suffix}") for name, label in labels.items()}
+    if not output.split_layers and main in beside:
+        beside[main] = path
     return {file: (name,) for name, file in beside.items()}
 
 
@@ -43,7 +47,8 @@ def write(film: Film, output: OutputSettings, path: Path) -> tuple[Path, ...]:
     Raises UsageError for a suffix, display or view that does not exist, OutputError for a file that cannot be
     written or does not read back as it was written; what stood at its path then still stands.
     """
-    files = targets(film.layers, output, path)
+    files = targets(in_order(film.layers), output, path)
+    film = film.under(output.variables)
     for file, names in files.items():
         with _appearing_at(file) as hidden:
             encode(film, names, output, hidden)

@@ -25,7 +25,7 @@ import numpy as np
 from defshade_cli import __version__
 from defshade_cli.image.cryptomatte import cryptomatte_header
 from defshade_cli.image.film import Film
-from defshade_cli.image.layers import LAYERS, Layer
+from defshade_cli.image.layers import Layer
 from defshade_cli.scene.camera import Camera
 from defshade_cli.spaces import Matrix
 
@@ -43,17 +43,17 @@ class Attribute(NamedTuple):
 def exr_attributes(film: Film, layers: tuple[str, ...]) -> Iterator[Attribute]:
     """All that an EXR with these layers carries, its colour space and compression apart."""
     chromaticities = film.render_space.chromaticities
-    if chromaticities and any(LAYERS[name].is_color for name in layers):
+    if chromaticities and any(film.row(name).is_color for name in layers):
         yield Attribute("chromaticities", "float[8]", chromaticities)
     yield from _camera(film)
     yield Attribute("FramesPerSecond", "rational", frame_rate(film.frames_per_second))
     yield from text_attributes(film)
     for name, value in provenance(film).items():
         yield _attribute(PREFIX + name, value)
-    yield Attribute(f"{PREFIX}layers", "string", json.dumps({name: _meaning(LAYERS[name]) for name in layers}))
+    yield Attribute(f"{PREFIX}layers", "string", json.dumps({name: _meaning(film.row(name)) for name in layers}))
     for name in layers:
         if name in film.manifests:
-            yield from _manifest(LAYERS[name], film.manifests[name])
+            yield from _manifest(film.row(name), film.manifests[name])
 
 
 def _meaning(layer: Layer) -> dict[str, str | bool]:

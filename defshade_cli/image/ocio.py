@@ -8,9 +8,12 @@ from __future__ import annotations
 
 from functools import cache
 
+import numpy as np
 import OpenImageIO as oiio
+from numpy.typing import NDArray
 
 from defshade_cli.errors import UsageError
+from defshade_cli.image.render_space import LINEAR_REC709, Matrix3, RenderSpace
 
 
 @cache
@@ -33,3 +36,35 @@ def linear_spaces(name: str = "") -> tuple[str, ...]:
     config = open_config(name)
     scene = (space for space in config.getColorSpaceNames() if not space.endswith("Display-referred"))
     return tuple(space for space in scene if config.isColorSpaceLinear(space))
+
+
+def find_render_space(name: str | None, config: str = "") -> RenderSpace:
+    """The scene-linear space that a config knows by `name`, an alias or a role; None for linear Rec.709.
+
+    Raises UsageError for a space that the config lacks, or one that is not linear.
+    """
+    if name is None:
+        return RenderSpace(config=config)
+    known = open_config(config)
+    space = known.resolve(name)
+    if space not in linear_spaces(config):
+        raise UsageError(f"no scene-linear space '{name}'; the OCIO config has {', '.join(linear_spaces(config))}")
+    chromaticities = known.get_chromaticities(space)
+    return RenderSpace(
+        name=space,
+        interop_id=known.get_color_interop_id(space) or space,
+        chromaticities=tuple(chromaticities) if chromaticities else None,
+        from_rec709=_matrix(space, config),
+        config=config,
+    )
+
+
+def _matrix(space: str, config: str) -> Matrix3:
+    """What the config makes of the three primaries of Rec.709, as columns."""
+    primaries = oiio.ImageBuf(np.eye(3, dtype=np.float32)[None])
+    moved = oiio.ImageBufAlgo.colorconvert(primaries, LINEAR_REC709, space, unpremult=False, colorconfig=config)
+    if moved.has_error:
+        raise UsageError(f"the OCIO config cannot take {LINEAR_REC709} to '{space}': {moved.geterror()}")
+    columns: NDArray = np.asarray(moved.get_pixels(oiio.FLOAT))[0]
+    rounded = np.where(np.isclose(columns, np.eye(3), atol=1e-6), np.eye(3), columns)
+    return tuple(tuple(float(value) for value in row) for row in rounded.T)

@@ -10,7 +10,7 @@ from defshade_cli.errors import OutputError
 from defshade_cli.image.colour import BRIGHTEST, Pixels
 from defshade_cli.image.encoders import EXR, suffix_of
 from defshade_cli.image.film import Film
-from defshade_cli.image.layers import LAYERS, layer_in_file
+from defshade_cli.image.layers import layer_in_file
 from defshade_cli.image.reading import read
 from defshade_cli.settings import OutputSettings
 
@@ -25,11 +25,11 @@ def verify(path: Path, film: Film, names: tuple[str, ...], output: OutputSetting
         _check_shape(names[0], next(iter(layers.values())), film.size)
         return
     for name in names:
-        found = layers.get(layer_in_file(LAYERS[name].exr_name))
+        found = layers.get(layer_in_file(film.row(name).exr_name))
         if found is None:
             raise OutputError(f"verified: layer {name} is missing from what was written")
         _check_shape(name, found, film.size)
-        _check_values(name, found, film.layers[name], output)
+        _check_values(name, found, film, output)
 
 
 def _check_shape(name: str, pixels: Pixels, size: tuple[int, int]) -> None:
@@ -38,8 +38,9 @@ def _check_shape(name: str, pixels: Pixels, size: tuple[int, int]) -> None:
         raise OutputError(f"verified: layer {name} reads back as {found}, not {wanted}")
 
 
-def _check_values(name: str, found: Pixels, written: Pixels, output: OutputSettings) -> None:
-    is_color = LAYERS[name].is_color
+def _check_values(name: str, found: Pixels, film: Film, output: OutputSettings) -> None:
+    written = film.layers[name]
+    is_color = film.row(name).is_color
     if is_color and output.compression == "dwaa":
         return
     if is_color and not output.full_float:

@@ -20,6 +20,7 @@ from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.linking import ALL_LINKED
+from defshade_cli.passes.screen import Screen
 from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.scene.environment import Environment
 from defshade_cli.scene.light import DomeLight
@@ -59,7 +60,7 @@ class EnvironmentVariant:
 class EnvironmentPass:
     """Compiled for one variant; keeps the skies it has drawn as textures."""
 
-    def __init__(self, gpu: Gpu, variant: EnvironmentVariant) -> None:
+    def __init__(self, gpu: Gpu, variant: EnvironmentVariant, screen: Screen) -> None:
         self._gpu = gpu
         generated = {
             "generated/planes.glsl": read_source(variant.planes, variant.layout),
@@ -67,7 +68,7 @@ class EnvironmentPass:
         }
         files = ("screen.vert", "environment.frag")
         self._program = gpu.shaders.program(*files, defines=variant.defines, generated=generated)
-        self._screen = gpu.keep(gpu.context.vertex_array(self._program, []))
+        self._screen, self._array = screen, screen.array(self._program)
         self._skies: dict[Environment, moderngl.Texture] = {}
 
     def draw(
@@ -84,7 +85,7 @@ class EnvironmentPass:
         for name, value in {**_uniforms(dome, sky), "first_link": first_link}.items():
             if name in self._program:
                 self._program[name] = value
-        self._screen.render(vertices=3)
+        self._screen.draw(self._array)
 
     def _texture(self, sky: Environment) -> moderngl.Texture:
         if sky not in self._skies:

@@ -30,13 +30,13 @@ class Frame:
             self._gbuffers[planes, layout] = make_gbuffer(self._gpu, size, planes, layout)
         return self._gbuffers[planes, layout]
 
-    def radiance(self, name: str, size: Size, gbuffer: GBuffer | None = None) -> Target:
-        """A float RGBA target with one texture "radiance"; it tests against the depth of `gbuffer` where given."""
+    def radiance(self, name: str, size: Size, gbuffer: GBuffer | None = None, components: int = 4) -> Target:
+        """A float target with one texture "radiance"; it tests against the depth of `gbuffer` where given."""
         self._resize(size)
         key = name, gbuffer
         if key not in self._radiance:
             depth = gbuffer.target.depth if gbuffer else None
-            self._radiance[key] = allocate(self._gpu, size, {"radiance": (4, "f4")}, depth)
+            self._radiance[key] = allocate(self._gpu, size, {"radiance": (components, "f4")}, depth)
         return self._radiance[key]
 
     def light_targets(self, radiance: Target, plan: Plan) -> LightTargets:

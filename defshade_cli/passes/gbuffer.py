@@ -13,6 +13,7 @@ from defshade_cli.gpu.residence import DrawList
 from defshade_cli.gpu.targets import Target, allocate
 from defshade_cli.gpu.textures import textures_source
 from defshade_cli.image.render_space import REC709, RenderSpace
+from defshade_cli.passes.screen import TileMask
 from defshade_cli.settings import Layout
 
 
@@ -75,17 +76,25 @@ class GBufferPass:
             "gbuffer.vert", "gbuffer.frag", defines=variant.defines, generated=generated
         )
 
-    def draw(self, draws: DrawList, gbuffer: GBuffer) -> None:
-        """All of `draws` with the bound View, one multi-draw; both sides of every face."""
+    def draw(self, draws: DrawList, gbuffer: GBuffer, mask: TileMask, *, whole: bool = False) -> None:
+        """All of `draws` with the bound View, one multi-draw; both sides of every face.
+
+        Under the mask the depth is the background's afterwards, and the planes are undefined unless `whole`.
+        """
         standard = uses_standard_depth(gbuffer.layout)
+        nearest, background = (0.0, 1.0) if standard else (1.0, 0.0)
         framebuffer = gbuffer.target.framebuffer
         framebuffer.use()
-        framebuffer.clear(depth=1.0 if standard else 0.0)
+        framebuffer.clear(depth=background)
         for attachment in integer_attachments(gbuffer.planes, gbuffer.layout):
             self._gpu.clear_integers(attachment)
+        if not whole:
+            mask.fill(gbuffer.target, nearest)
+        framebuffer.use()
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = "<" if standard else ">"
         draws.textures.bind(self._program)
         vertex_array = self._context.vertex_array(self._program, draws.vertices_of(self._program), draws.indices)
         vertex_array.render_indirect(draws.commands)
         vertex_array.release()
+        mask.fill(gbuffer.target, background)

@@ -59,13 +59,13 @@ class Mattes:
         for layer, coverage in self._coverage.items():
             coverage.add(self._tables[layer][visible[..., 0].ravel()])
 
-    def layers(self) -> dict[str, NDArray[np.float32]]:
-        """(H, W, 2 · ranks) each."""
+    def layers(self, samples: int) -> dict[str, NDArray[np.float32]]:
+        """(H, W, 2 · ranks) each, of so many samples."""
         width, height = self._plan.size
         return {
-            layer: coverage.ranked(
-                name_ids(self._names[layer]), self._plan.ranks, self._plan.samples, width * height
-            ).reshape(height, width, -1)
+            layer: coverage.ranked(name_ids(self._names[layer]), self._plan.ranks, samples, width * height).reshape(
+                height, width, -1
+            )
             for layer, coverage in self._coverage.items()
         }
 
@@ -79,13 +79,27 @@ class Mattes:
 
 
 def _tables(identities: Identities) -> dict[str, Table]:
-    return {"primId": identities.prim, "instanceId": identities.instance, "materialId": identities.material}
+    numbers = {text: number for number, text in enumerate(_labels(identities))}
+    labels = {path: numbers[text] for path, text in identities.scene.labels.items()}
+    return {
+        "primId": identities.prim,
+        "instanceId": identities.instance,
+        "materialId": identities.material,
+        "semantic": identities.of_prims(labels),
+    }
+
+
+def _labels(identities: Identities) -> list[str]:
+    """Every set of labels, in alphabetic order, which does not depend on what else is drawn."""
+    return sorted(set(identities.scene.labels.values()))
 
 
 def _names(layer: str, identities: Identities) -> dict[int, str]:
     match layer:
         case "primId":
             return {number: path for path, number in identities.paths.items()}
+        case "semantic":
+            return dict(enumerate(_labels(identities)))
         case "materialId":
             return dict(enumerate(material.path for material in identities.scene.materials))
         case _:

@@ -39,9 +39,9 @@ class LightTargets:
             if self.framebuffers[groups] is not self.radiance.framebuffer:
                 self.framebuffers[groups].release()
 
-    def layers(self, samples: int) -> dict[str, NDArray[np.float32]]:
-        """(H, W, C) of each layer that is a sum."""
-        return {name: _layer(name, target.read("sum"), samples) for name, target in self.sums.items()}
+    def layers(self, counts: NDArray[np.int32]) -> dict[str, NDArray[np.float32]]:
+        """(H, W, C) of each layer that is a sum. counts: (H, W, 1) samples that each pixel got."""
+        return {name: _layer(name, target.read("sum"), counts.astype(np.float32)) for name, target in self.sums.items()}
 
 
 def make_light_targets(gpu: Gpu, radiance: Target, plan: Plan) -> LightTargets:
@@ -64,12 +64,12 @@ def _framebuffer(gpu: Gpu, radiance: Target, sums: list[Target]) -> moderngl.Fra
     return framebuffer
 
 
-def _layer(name: str, total: NDArray[np.float32], samples: int) -> NDArray[np.float32]:
+def _layer(name: str, total: NDArray[np.float32], counts: NDArray[np.float32]) -> NDArray[np.float32]:
     match name:
         case "shadow":
             arrived, sent = total[..., :1], total[..., 1:2]
             return np.divide(arrived, sent, out=np.ones_like(sent), where=sent > 0.0)
         case "lightComplexity":
-            return total[..., :1] / np.float32(samples)
+            return total[..., :1] / counts
         case _:
-            return total[..., :3] / np.float32(samples)
+            return total[..., :3] / counts

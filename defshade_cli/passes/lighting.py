@@ -25,6 +25,7 @@ from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.linking import ALL_LINKED
+from defshade_cli.passes.screen import Screen
 from defshade_cli.passes.shadows import ShadowAtlas
 from defshade_cli.passes.tables import NO_TABLES, LightTables
 from defshade_cli.passes.volumes import cone_volume, sphere_volume
@@ -32,6 +33,7 @@ from defshade_cli.plan import Plan, PlannedLight, Volume
 from defshade_cli.scene.emission import Emitter
 from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import Light, Profile, Shaping
+from defshade_cli.scene.shadow import ShadowStyle
 from defshade_cli.settings import Layout, Shading
 
 _PROFILES: tuple[Profile, ...] = ("uniform", "cosine", "sine")
@@ -51,6 +53,7 @@ class LightingVariant:
     shading: Shading
     orthographic: bool
     shadows: bool
+    shadow_styles: bool
     ies: bool
     volumes: tuple[Volume, ...]
     outputs: tuple[str, ...] = ()
@@ -66,6 +69,7 @@ class LightingVariant:
             plan.shading,
             orthographic,
             plan.shadows,
+            plan.shadow_styles,
             bool(plan.profiles),
             plan.volumes,
             plan.outputs,
@@ -76,27 +80,32 @@ class LightingVariant:
     @property
     def defines(self) -> list[str]:
         flags = ["CLASSIC"] * (self.shading == "classic") + ["ORTHOGRAPHIC"] * self.orthographic
-        flags += ["SHADOWS"] * self.shadows + ["IES"] * self.ies + space_defines(self.space)
+        flags += (
+            ["SHADOWS"] * self.shadows
+            + ["SHADOW_STYLES"] * self.shadow_styles
+            + ["IES"] * self.ies
+            + space_defines(self.space)
+        )
         return [plane.define for plane in self.planes] + flags + output_defines(self.outputs)
 
 
 class LightingPass:
     """Compiled for one variant."""
 
-    def __init__(self, gpu: Gpu, variant: LightingVariant) -> None:
-        self._context = gpu.context
+    def __init__(self, gpu: Gpu, variant: LightingVariant, screen: Screen) -> None:
+        self._context, self._screen = gpu.context, screen
         generated = {
             "generated/planes.glsl": read_source(variant.planes, variant.layout),
             "generated/outputs.glsl": outputs_source(variant.outputs, variant.groups),
         }
         emission = gpu.shaders.program("screen.vert", "emission.frag", defines=variant.defines, generated=generated)
-        self._emission = gpu.keep(gpu.context.vertex_array(emission, []))
+        self._emission = screen.array(emission)
         self._volumes: dict[Volume, moderngl.VertexArray] = {}
         for volume in variant.volumes:
             defines = variant.defines + ["VOLUME_QUAD"] * (volume == "quad")
             files = (f"light_{volume}.vert", "lighting.frag")
             program = gpu.shaders.program(*files, defines=defines, generated=generated)
-            self._volumes[volume] = _volume_array(gpu, volume, program)
+            self._volumes[volume] = screen.array(program) if volume == "quad" else _volume_array(gpu, volume, program)
 
     def begin(self, gbuffer: GBuffer, targets: LightTargets) -> None:
         """Emission and coverage: the sample's radiance is overwritten, and the group of what is emitted grows."""
@@ -104,12 +113,12 @@ class LightingPass:
         targets.radiance.framebuffer.depth_mask = False
         self._context.enable_only(moderngl.NOTHING)
         gbuffer.bind(self._emission.program)
-        self._emission.render(vertices=3)
+        self._screen.draw(self._emission)
         if DEFAULT_GROUP in targets.sums:
             targets.sums[DEFAULT_GROUP].framebuffer.use()
             self._context.enable_only(moderngl.BLEND)
             self._context.blend_func = moderngl.ONE, moderngl.ONE
-            self._emission.render(vertices=3)
+            self._screen.draw(self._emission)
 
     def add(
         self,
@@ -129,19 +138,23 @@ class LightingPass:
             targets.framebuffers[groups].use()
             maps = shadows.depth if shadows else None
             gbuffer.bind(self._volumes[volume].program, shadow_atlas=maps, ies_tables=tables.candela)
-            self._draw_volumes(volume, alike.index((volume, groups)), alike.count((volume, groups)))
+            draw = self._draw_quads if volume == "quad" else self._draw_volumes
+            draw(self._volumes[volume], alike.index((volume, groups)), alike.count((volume, groups)))
         self._context.disable_direct(DEPTH_CLAMP)
 
-    def _draw_volumes(self, volume: Volume, first: int, count: int) -> None:
-        array, local = self._volumes[volume], moderngl.DEPTH_TEST | moderngl.CULL_FACE
-        self._context.enable_only(moderngl.BLEND | (moderngl.NOTHING if volume == "quad" else local))
+    def _draw_quads(self, array: moderngl.VertexArray, first: int, count: int) -> None:
+        self._context.enable_only(moderngl.BLEND)
+        for light in range(first, first + count):
+            array.program["first_light"] = light
+            self._screen.draw(array)
+
+    def _draw_volumes(self, array: moderngl.VertexArray, first: int, count: int) -> None:
+        self._context.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         array.program["first_light"] = first
-        array.render(vertices=3 if volume == "quad" else -1, instances=count)
+        array.render(instances=count)
 
 
 def _volume_array(gpu: Gpu, volume: Volume, program: moderngl.Program) -> moderngl.VertexArray:
-    if volume == "quad":
-        return gpu.keep(gpu.context.vertex_array(program, []))
     corners, triangles = sphere_volume() if volume == "sphere" else cone_volume()
     vertices = gpu.keep(gpu.context.buffer(corners.tobytes()))
     indices = gpu.keep(gpu.context.buffer(triangles.tobytes()))
@@ -166,6 +179,7 @@ def light_records(
         row["is_sky"] = planned.light.kind == "dome"
         _set_shaping(row, planned.light.shaping)
         _set_profile(row, planned.light, tables.profiles)
+        _set_shadow(row, planned.light.shadow)
         row["first_link"] = tables.links.lights.get(planned.light, ALL_LINKED)
     if shadows:
         records["first_shadow"], records["shadow_count"] = shadows.first, shadows.count
@@ -179,6 +193,11 @@ def _set_shaping(row: np.void, shaping: Shaping | None) -> None:
     angle, softness = math.radians(shaping.cone_angle), min(max(shaping.cone_softness, 0.0), 1.0)
     row["cone_angle"], row["cone_smooth_start"] = angle, angle * (1.0 - softness)
     row["focus"], row["focus_tint"] = shaping.focus, shaping.focus_tint
+
+
+def _set_shadow(row: np.void, shadow: ShadowStyle) -> None:
+    row["shadow_color"], row["shadow_distance"] = shadow.color, shadow.distance
+    row["shadow_fading"], row["shadow_gamma"] = shadow.fading, shadow.gamma
 
 
 def _set_profile(row: np.void, light: Light, profiles: Sequence[IesProfile]) -> None:

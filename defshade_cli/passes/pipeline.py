@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
@@ -9,8 +10,8 @@ from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import MOST_TARGETS, Plane
-from defshade_cli.gpu.residence import LIGHTS, VIEW, DrawList, GpuScene, RecordBuffer
-from defshade_cli.image.film import Film
+from defshade_cli.gpu.residence import LIGHTS, MOTIONS, VIEW, DrawList, GpuScene, RecordBuffer
+from defshade_cli.image.film import Film, Sampling
 from defshade_cli.passes.accumulation import AccumulationPass
 from defshade_cli.passes.emitters import LitSample, light_batches
 from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
@@ -20,13 +21,18 @@ from defshade_cli.passes.identification import Manifests, Mattes, id_manifests
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.lighting import LightingPass, LightingVariant, light_records
 from defshade_cli.passes.linking import ALL_LINKED
+from defshade_cli.passes.motion import motion_records, neighbouring_points
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
+from defshade_cli.passes.screen import Screen, TileMask
 from defshade_cli.passes.shadows import ShadowAtlas, ShadowPass
+from defshade_cli.passes.stopping import Stopping
 from defshade_cli.passes.tables import LightTables, TableStore
 from defshade_cli.passes.view import view_record
-from defshade_cli.plan import Plan
+from defshade_cli.plan import Plan, ShutterSample
 from defshade_cli.scene.scene import Scene
+
+Layers = dict[str, NDArray[np.float32]]
 
 
 class Pipeline:
@@ -39,26 +45,34 @@ class Pipeline:
         self._frame = Frame(gpu)
         self._view = RecordBuffer(gpu, VIEW)
         self._lights = RecordBuffer(gpu, LIGHTS)
+        self._motions = RecordBuffer(gpu, MOTIONS)
+        self._screen, self._mask = Screen(gpu), TileMask(gpu)
         self._gbuffer_pass = cache(lambda variant: GBufferPass(gpu, variant))
-        self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant))
-        self._environment_pass = cache(lambda variant: EnvironmentPass(gpu, variant))
+        self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant, self._screen))
+        self._environment_pass = cache(lambda variant: EnvironmentPass(gpu, variant, self._screen))
         self._shadow_pass = cache(
             lambda cutout, color_varies, texture_groups, linked: ShadowPass(
                 gpu, cutout=cutout, color_varies=color_varies, texture_groups=texture_groups, linked=linked
             )
         )
         self._tables = TableStore(gpu)
-        self._accumulation = AccumulationPass(gpu)
+        self._accumulation = AccumulationPass(gpu, self._frame, self._screen)
+        self._stopping = Stopping(gpu, self._frame, self._screen, self._mask)
 
-    def render(self, scene: Scene, plan: Plan) -> Film:
-        """The plan's layers. Raises GpuError."""
+    def render(self, scene: Scene, plan: Plan, moments: Iterator[ShutterSample] | None = None) -> Film:
+        """The plan's layers. Raises GpuError.
+
+        moments: what samples see in turn, where the plan has motion blur; data layers show the scene itself.
+        """
         self._gpu.make_current()
-        draws = self._scene.update(scene, plan.inputs)
-        layers: dict[str, NDArray[np.float32]] = {}
+        draws = self._resident(scene, plan)
+        layers: Layers = {}
         manifests: Manifests = {}
+        sampling = Sampling(1, 1.0, 1)
         if plan.sampled:
-            layers, manifests = self._sampled_layers(draws, scene, plan)
+            layers, manifests, sampling = self._sampled_layers(draws, scene, plan, moments)
         if plan.data_layers:
+            draws = self._resident(scene, plan) if plan.moments else draws
             data = data_layers(self._data_planes(draws, plan), plan, scene)
             layers, manifests = layers | data, manifests | id_manifests(data, scene)
         return Film(
@@ -71,8 +85,17 @@ class Pipeline:
             scene_name=scene.name,
             frame=scene.frame,
             frames_per_second=scene.frames_per_second,
-            samples=plan.samples,
+            samples=sampling.most,
+            metadata=sampling.facts if plan.sampled else {},
         )
+
+    def _resident(self, scene: Scene, plan: Plan) -> DrawList:
+        """The scene on the GPU, with what the plan's planes read of it."""
+        moved: tuple[NDArray[np.float32], ...] = ()
+        if "MOTION" in plan.inputs:
+            self._motions.write(motion_records(scene, plan))
+            moved = tuple(neighbouring_points(scene))
+        return self._scene.update(scene, plan.inputs, moved, plan.primvars)
 
     def planes(self, scene: Scene, plan: Plan) -> Planes:
         """The float GBuffer at the pixels' centres: what the float64 reference is evaluated on."""
@@ -80,27 +103,33 @@ class Pipeline:
         return self._drawn_planes(self._scene.update(scene), plan.planes, plan)
 
     def _sampled_layers(
-        self, draws: DrawList, scene: Scene, plan: Plan
-    ) -> tuple[dict[str, NDArray[np.float32]], Manifests]:
-        """What is a mean of samples, and what ids in it stand for."""
+        self, draws: DrawList, scene: Scene, plan: Plan, moments: Iterator[ShutterSample] | None
+    ) -> tuple[Layers, Manifests, Sampling]:
+        """What is a mean over samples or tells of them, and what ids in it stand for."""
         mattes = Mattes(scene, plan)
         gbuffer = self._frame.gbuffer(plan.size, plan.planes, plan.layout)
         radiance = self._frame.radiance("sample", plan.size, gbuffer)
-        total = self._frame.radiance("total", plan.size) if plan.samples > 1 else radiance
-        total.framebuffer.clear()
         targets = self._frame.light_targets(radiance, plan)
         targets.clear()
         tables = self._tables.update(plan)
+        self._accumulation.begin(plan.size, plan.samples)
+        self._stopping.begin(plan)
         for sample in samples(plan.samples, plan.filter, plan.filter_width):
+            if moments and plan.moments and sample.index % plan.samples_a_moment == 0:
+                scene, plan = next(moments)
+                draws, tables = self._scene.update(scene, plan.inputs), self._tables.update(plan)
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             if plan.mattes:
                 mattes.add(gbuffer.target.read("visible"))
             self._light(draws, scene, plan, sample, tables, gbuffer, targets)
-            if plan.samples > 1:
-                self._accumulation.add(radiance, total)
-        beauty = np.divide(total.read("radiance"), plan.samples, dtype=np.float32)
-        lit = {"beauty": beauty, "alpha": beauty[..., 3:]} | targets.layers(plan.samples)
-        return lit | mattes.layers(), mattes.manifests()
+            self._accumulation.add(radiance)
+            if self._stopping.is_over(self._accumulation):
+                break
+        sampling, counts, variance = self._stopping.finish(self._accumulation.count)
+        beauty = self._accumulation.mean(counts)
+        layers = {"beauty": beauty, "alpha": beauty[..., 3:]} | targets.layers(counts)
+        layers |= {"variance": variance, "sampleCount": counts.astype(np.float32)}
+        return layers | mattes.layers(self._accumulation.count), mattes.manifests(), sampling
 
     def _light(
         self,
@@ -154,4 +183,4 @@ class Pipeline:
         variant = GBufferVariant(
             gbuffer.planes, gbuffer.layout, plan.cutout, draws.color_varies, draws.texture_groups, plan.render_space
         )
-        self._gbuffer_pass(variant).draw(draws, gbuffer)
+        self._gbuffer_pass(variant).draw(draws, gbuffer, self._mask, whole=bool(plan.mattes))

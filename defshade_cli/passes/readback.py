@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.planes import Plane, uses_standard_depth
-from defshade_cli.image.layers import LAYERS, Layer
+from defshade_cli.image.layers import LAYERS, PRIMVAR_FAMILY, Layer
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.identification import id_values
 from defshade_cli.passes.view import camera_depth
@@ -17,6 +18,8 @@ from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.identity import Identities
 from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import transform_directions, transform_points
+
+log = logging.getLogger("defshade")
 
 Planes = dict[str, NDArray]
 
@@ -38,10 +41,20 @@ def data_layers(planes: Planes, plan: Plan, scene: Scene) -> dict[str, NDArray[n
         layer = LAYERS[name]
         if layer.source == "visible":
             values: NDArray = id_values(name, planes["visible"], identities)
+        elif layer.source == "primvar":
+            values = _primvar_values(name.removeprefix(PRIMVAR_FAMILY), planes, plan, scene)
         else:
             values = _layer_values(layer, planes, plan.camera)
         layers[name] = np.where(covered, values, np.float32(layer.background)).astype(np.float32)
     return layers
+
+
+def _primvar_values(name: str, planes: Planes, plan: Plan, scene: Scene) -> NDArray:
+    """As many numbers as the primvar has where it has most; one where no prim has it."""
+    widths = [mesh.primvars[name].shape[1] for mesh in scene.meshes if name in mesh.primvars]
+    if not widths:
+        log.warning("%s%s: no prim has such a primvar", PRIMVAR_FAMILY, name)
+    return planes[f"primvar_{plan.primvars.index(name)}"][..., : max(widths, default=1)]
 
 
 def _layer_values(layer: Layer, planes: Planes, camera: Camera) -> NDArray:

@@ -18,7 +18,7 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.records import record
 from defshade_cli.gpu.residence import SHADOW_MAPS, DrawList, RecordBuffer
 from defshade_cli.gpu.textures import textures_source
-from defshade_cli.passes.view import clip_from_camera
+from defshade_cli.passes.view import clip_from_camera, depth_coefficients
 from defshade_cli.scene.camera import Camera, Projection
 from defshade_cli.scene.emission import Emitter
 from defshade_cli.scene.light import Shaping
@@ -216,6 +216,7 @@ def _map_record(camera: Camera, tile: int, jitter: tuple[float, float]) -> NDArr
     row["clip_from_relative"] = (clip_from_light @ camera.camera_from_world).T
     row["tile"] = (tile % TILES / TILES, tile // TILES / TILES, 1 / TILES, 1 / TILES)
     row["texel"], row["resolution"] = max(texel), RESOLUTION
+    row["depth_coefficients"] = depth_coefficients(camera, camera.clipping_range, standard=False)
     return row
 
 

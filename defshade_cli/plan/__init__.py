@@ -2,6 +2,6 @@
 
 from defshade_cli.plan.decisions import Decision
 from defshade_cli.plan.lights import PlannedLight, Volume, volume_of
-from defshade_cli.plan.plan import Plan, make_plan
+from defshade_cli.plan.plan import Plan, ShutterSample, make_plan, plan_moments
 
-__all__ = ["Decision", "Plan", "PlannedLight", "Volume", "make_plan", "volume_of"]
+__all__ = ["Decision", "Plan", "PlannedLight", "ShutterSample", "Volume", "make_plan", "plan_moments", "volume_of"]

@@ -43,9 +43,11 @@ def explain(plan: Plan) -> Iterator[Decision]:
         yield Decision("portals", "passed over", "hints: domes are sampled by their radiance")
     yield _kept("cutout", plan.cutout, "some opacity is or may be below 1", "no opacity is below 1")
     yield _kept("textures", plan.textures, "a material reads them", "no material reads any")
+    yield _explain_motion(plan)
     if plan.data_layers:
         jittered, shared = "the beauty's is jittered, quantised or dithered", "the beauty's own float sample serves"
         yield _kept("data GBuffer", plan.data_pass, jittered if plan.sampled else "as asked", shared)
+    yield _kept("error estimate", plan.tracks_error, "as asked", "nothing needs it")
     if not plan.lit:
         yield Decision("lighting", "skipped", "no layer needs it")
 
@@ -57,6 +59,13 @@ def _explain_subdivision(plan: Plan) -> Decision:
     levels = f"{least} levels" if least == most else f"{least} to {most} levels"
     reason = "by the surfaces' size in the image" if plan.complexity == "auto" else f"complexity {plan.complexity}"
     return Decision("subdivision", levels, reason)
+
+
+def _explain_motion(plan: Plan) -> Decision:
+    if not plan.moments:
+        return Decision("motion blur", "skipped", "one sample, a still stage, a closed shutter, or not asked")
+    opens, closes = plan.camera.shutter
+    return Decision("motion blur", f"{plan.moments} moments", f"the shutter is open from {opens:g} to {closes:g}")
 
 
 def _kept(subject: str, kept: bool, why: str, why_not: str) -> Decision:

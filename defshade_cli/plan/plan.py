@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.gpu.planes import MOST_TARGETS, Plane, named_planes, needed_planes
-from defshade_cli.image.layers import LAYERS, resolve
-from defshade_cli.image.render_space import RenderSpace, find_render_space
+from defshade_cli.errors import UsageError
+from defshade_cli.gpu.planes import MOST_PRIMVARS, MOST_TARGETS, Plane, named_planes, needed_planes
+from defshade_cli.image.layers import BEAUTY, LAYERS, PRIMVAR_FAMILY, resolve
+from defshade_cli.image.ocio import find_render_space
+from defshade_cli.image.render_space import RenderSpace
 from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.groups import light_groups, light_outputs
 from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
+from defshade_cli.plan.moments import count_moments, share_moments
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
+from defshade_cli.scene.shadow import PLAIN
 from defshade_cli.scene.window import DataWindow, from_ndc
 from defshade_cli.settings import FILTERS, Complexity, Filter, Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
@@ -35,7 +40,8 @@ class Plan:
     clip: (near, far), the camera's range tightened to the geometry.
     render_space: of light and reflectance.
     exposure: linear, the camera's and the settings' together.
-    filter_width: pixels.
+    samples: a pixel at most.  max_error, time_limit: of RenderSettings.  filter_width: pixels.
+    moments: of the shutter that the samples see, in turn; 0 without motion blur.
     planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
     lights: sorted quads, spheres, cones.
     shadows: some light casts them.  shadow_linked: in some light not all geometry does.
@@ -57,6 +63,9 @@ class Plan:
     layout: Layout
     shading: Shading
     samples: int
+    max_error: float | None
+    time_limit: float | None
+    moments: int
     filter: Filter
     filter_width: float
     layers: tuple[str, ...]
@@ -85,6 +94,18 @@ class Plan:
         return any(LAYERS[name].source == "lighting" for name in self.layers)
 
     @property
+    def tracks_error(self) -> bool:
+        """Is the error of the mean asked for?"""
+        asked = self.max_error is not None or self.time_limit is not None or "variance" in self.layers
+        return self.sampled and self.samples > 1 and asked
+
+    @property
+    def samples_a_moment(self) -> int:
+        """How many samples in a row see the same moment."""
+        may_stop = self.max_error is not None or self.time_limit is not None
+        return share_moments(self.samples, self.moments, may_stop=may_stop)
+
+    @property
     def sampled(self) -> bool:
         """Is any layer a mean of samples?"""
         return any(LAYERS[name].is_sampled for name in self.layers)
@@ -98,6 +119,11 @@ class Plan:
     def inputs(self) -> frozenset[str]:
         """What the planes need of the vertices beside what lighting does."""
         return frozenset(name for plane in (*self.planes, *self.data_planes) for name in plane.inputs)
+
+    @property
+    def primvars(self) -> tuple[str, ...]:
+        """Names of the primvars that layers show, in the order of their planes."""
+        return primvar_names(self.layers)
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -124,6 +150,11 @@ class Plan:
         return tuple(planned for planned in self.lights if isinstance(planned.light, DomeLight))
 
     @property
+    def shadow_styles(self) -> bool:
+        """Are some shadows other than black, or do they end?"""
+        return self.shadows and any(p.light.casts_shadow and p.light.shadow != PLAIN for p in self.lights)
+
+    @property
     def profiles(self) -> tuple[IesProfile, ...]:
         """The IES profiles of the lights, each once."""
         shapings = [planned.light.shaping for planned in self.lights]
@@ -139,7 +170,7 @@ class Plan:
         """Names of the passes in the order of the pipeline."""
         before = ("gbuffer", "emission", *("environment",) * bool(self.domes), *("shadow maps",) * self.shadows)
         lighting = before + tuple(f"light {volume}" for volume in self.volumes)
-        accumulation = ("accumulation",) * (self.samples > 1)
+        accumulation = ("accumulation",) * (self.samples > 1) + ("batch means",) * self.tracks_error
         return (lighting + accumulation if self.sampled else ()) + ("data gbuffer",) * self.data_pass
 
     @property
@@ -150,7 +181,7 @@ class Plan:
 
 def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     """Decide. Raises UsageError for a layer or a render space that does not exist, or an image without pixels."""
-    layers = resolve(settings.layers)
+    layers = resolve(settings.layers or (BEAUTY,))
     display = image_size(scene.camera.aspect, settings.size, settings.width, scene.resolution)
     display_camera = scene.camera.conformed(display[0] * scene.pixel_aspect / display[1], scene.conform)
     window = DataWindow(*settings.crop) if settings.crop else from_ndc(scene.data_window, display)
@@ -170,7 +201,10 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         exposure=exposure,
         layout=settings.layout,
         shading=settings.shading,
-        samples=settings.samples,
+        samples=settings.most_samples,
+        max_error=settings.max_error,
+        time_limit=settings.time_limit,
+        moments=count_moments(scene, settings),
         filter=settings.filter,
         filter_width=settings.filter_width or FILTERS[settings.filter],
         layers=layers,
@@ -190,11 +224,32 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     )
 
 
+ShutterSample = tuple[Scene, Plan]
+"""What is there while the shutter is open, at one time."""
+
+
+def plan_moments(scene: Scene, plan: Plan, seen: Iterator[Scene], settings: RenderSettings) -> Iterator[ShutterSample]:
+    """What the samples see in turn: `seen` with plans that fill the same planes.
+
+    Where a matte is asked for, which counts what the frame draws, a moment that draws something else shows the frame.
+    """
+    for moment in seen:
+        if plan.mattes and not moment.draws_like(scene):
+            yield scene, plan
+        else:
+            yield moment, replace(make_plan(moment, settings), planes=plan.planes)
+
+
 def _seen_lights(lights: tuple[PlannedLight, ...], layers: tuple[str, ...]) -> tuple[PlannedLight, ...]:
     """All lights for a lit layer; for mere coverage the domes, which cover what is behind the geometry."""
     if any(LAYERS[name].source == "lighting" for name in layers):
         return lights
     return tuple(planned for planned in lights if isinstance(planned.light, DomeLight))
+
+
+def primvar_names(layers: tuple[str, ...]) -> tuple[str, ...]:
+    """Of the layers that show primvars, these."""
+    return tuple(name.removeprefix(PRIMVAR_FAMILY) for name in layers if name.startswith(PRIMVAR_FAMILY))
 
 
 def _divide_planes(
@@ -208,10 +263,13 @@ def _divide_planes(
     rows = [LAYERS[name] for name in layers]
     lit = _lit_planes(scene) if any(row.source == "lighting" for row in rows) else ()
     lit += named_planes("visible" for row in rows if row.source == "matte")
-    data = named_planes(row.source for row in rows)
+    shown = primvar_names(layers)
+    if len(shown) > MOST_PRIMVARS:
+        raise UsageError(f"{len(shown)} primvars are asked for as layers, and {MOST_PRIMVARS} can be shown at once")
+    data = named_planes([row.source for row in rows] + [f"primvar_{i}" for i in range(len(shown))])
     both = named_planes(plane.name for plane in (*lit, *data))
     sampled, has_data = any(row.is_sampled for row in rows), not all(row.is_sampled for row in rows)
-    exact = settings.layout == "float" and settings.samples == 1 and not cutout and len(both) <= MOST_TARGETS
+    exact = settings.layout == "float" and settings.most_samples == 1 and not cutout and len(both) <= MOST_TARGETS
     data_pass = has_data and not (sampled and exact)
     return (lit if data_pass or not has_data else both), data, data_pass
 
@@ -226,7 +284,7 @@ def _has_cutout(scene: Scene) -> bool:
         return True
     varying = [m.display_opacity for m in scene.meshes if m.display_opacity is not None]
     constant = [d.display_opacity for d in scene.drawables]
-    return any(m.uses_display_color for m in scene.materials) and any((o < 1.0).any() for o in varying + constant)
+    return any(m.uses_display_opacity for m in scene.materials) and any((o < 1.0).any() for o in varying + constant)
 
 
 def _tight_clip(camera: Camera, bounds: NDArray[np.float64]) -> tuple[float, float]:

@@ -31,7 +31,7 @@ def apparent_size(light: Light, bounds: NDArray[np.float64]) -> float:
 def share_points(sizes: Sequence[float], settings: RenderSettings) -> list[int]:
     """Points a sample of each light."""
     large = sum(size > _SMALL for size in sizes)
-    most = settings.light_points / settings.samples / max(large, 1)
+    most = settings.light_points / settings.most_samples / max(large, 1)
     return [_power_of_two(most * _share(size)) for size in sizes]
 
 

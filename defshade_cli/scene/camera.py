@@ -64,6 +64,15 @@ class Camera:
     def __post_init__(self) -> None:
         object.__setattr__(self, "world_from_camera", frozen(self.world_from_camera, np.float64, 4, 4))
 
+    def shutter_times(self, count: int) -> tuple[float, ...]:
+        """The middles of `count` equal parts of the shutter, in time codes around the frame.
+
+        In the order of van der Corput's sequence: any first few are spread over the whole shutter.
+        """
+        opens, closes = self.shutter
+        parts = sorted(range(count), key=lambda part: f"{part:032b}"[::-1])
+        return tuple(opens + (closes - opens) * (part + 0.5) / count for part in parts)
+
     @property
     def position(self) -> NDArray[np.float64]:
         """(3,) the eye in world space."""

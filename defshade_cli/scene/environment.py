@@ -9,12 +9,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.scene.arrays import frozen
 from defshade_cli.scene.distribution import GridDistribution
+
+SkyLayout = Literal["automatic", "latlong", "mirroredBall", "angular", "cubeMapVerticalCross"]
+"""Of an image of the sky, by UsdLux's names."""
 
 _CELLS = (128, 256)
 """Rows and columns that directions are drawn from; a finer map is averaged into them."""

@@ -25,6 +25,7 @@ class Mesh:
     display_color: (V, 3) float32, scene-linear, where it varies over the mesh; else None and the drawable has it.
     display_opacity: (V,) float32 likewise.
     double_sided: as authored. Both sides are drawn either way.
+    primvars: name → (V, 1 to 4) float32, those that only layers show.
     uvs: primvar name → (V, 2) float32 texture coordinates, (0, 0) at the lower left of an image.
     level: how often a subdivision surface was refined; None for what is no such surface.
     """
@@ -38,6 +39,7 @@ class Mesh:
     display_opacity: NDArray[np.float32] | None = None
     double_sided: bool = False
     uvs: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
+    primvars: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
     level: int | None = None
 
     def __post_init__(self) -> None:
@@ -51,6 +53,9 @@ class Mesh:
             freeze(self, "display_color", frozen(self.display_color, np.float32, count, 3))
         if self.display_opacity is not None:
             freeze(self, "display_opacity", frozen(self.display_opacity, np.float32, count))
+        freeze(
+            self, "primvars", {name: frozen(values, np.float32, count, -1) for name, values in self.primvars.items()}
+        )
         freeze(self, "uvs", {name: frozen(uv, np.float32, count, 2) for name, uv in self.uvs.items()})
 
     @cached_property

@@ -20,10 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.scene.arrays import frozen
-from defshade_cli.scene.environment import Environment
+from defshade_cli.scene.environment import Environment, SkyLayout
 from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.linking import Links
 from defshade_cli.scene.radiance_map import RadianceMap
+from defshade_cli.scene.shadow import PLAIN, ShadowStyle
 from defshade_cli.scene.texture import ImageFile
 from defshade_cli.spaces import Matrix, normalize
 
@@ -90,6 +91,7 @@ class Light(ABC):
     specular: float = 1.0
     shaping: Shaping | None = None
     casts_shadow: bool = True
+    shadow: ShadowStyle = PLAIN
     group: str = ""
     links: Links | None = None
 
@@ -181,11 +183,12 @@ class DistantLight(Light):
 class DomeLight(Light):
     """Light from all around; `normalize` does not concern it.
 
-    texture: file of the sky's latitude-longitude image, None for an even one.
+    texture: file of the sky's image, None for an even one.  layout: how the image shows it.
     environment: the sky itself where it is not a file's, in light space.
     """
 
     texture: str | None = None
+    layout: SkyLayout = "automatic"
     environment: Environment | None = None
     kind = "dome"
     is_infinite = True

@@ -33,8 +33,10 @@ TEXTURED_FIELDS = (
 class Material:
     """UsdPreviewSurface inputs with the schema's defaults; colours are scene-linear in the render space.
 
-    uses_display_color: diffuse_color and opacity come from the drawable's displayColor and displayOpacity:
-        the material of a prim that has none bound, or a displayColor reader.
+    uses_display_color: diffuse_color comes from the drawable's display_color, and only stands in where it has none.
+    uses_display_opacity: opacity likewise. A prim without a bound material has both, a material that reads
+        the primvars either.
+    color_primvar: what is read in the place of displayColor; empty for displayColor itself.
     one_sided: not seen from behind; only for materials whose opacity is textured, as the cards of draw modes are.
     inputs: the textures, by the name of the field in TEXTURED_FIELDS that they replace.
     """
@@ -54,6 +56,8 @@ class Material:
     ior: float = 1.5
     occlusion: float = 1.0
     uses_display_color: bool = False
+    uses_display_opacity: bool = False
+    color_primvar: str = ""
     one_sided: bool = False
     inputs: Mapping[str, TextureInput] = field(default_factory=dict, hash=False)
 
@@ -63,5 +67,5 @@ class Material:
         return tuple(dict.fromkeys(i.uv for i in self.inputs.values() if i.uv))
 
 
-UNBOUND = Material("<unbound>", uses_display_color=True)
+UNBOUND = Material("<unbound>", uses_display_color=True, uses_display_opacity=True)
 """What a prim without a bound material is drawn with."""

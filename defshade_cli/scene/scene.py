@@ -13,6 +13,7 @@ from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.geometry import Drawable, Mesh, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import Material
+from defshade_cli.scene.motion import Moment
 from defshade_cli.scene.texture import Texture
 from defshade_cli.scene.window import WHOLE_IMAGE
 from defshade_cli.spaces import ConformPolicy
@@ -32,7 +33,9 @@ class Scene:
 
     camera: the one to render; cameras: the paths of all that the stage has.
     portals: paths of the PortalLights, hints for sampling domes.
-    frame: time code, None for the default time.
+    frame: time code, None for the default time.  moves: something may differ while the shutter is open.
+    labels: path of a drawn prim → its semantic labels, such as `class:chair,furniture`; empty unless asked for.
+    neighbours: a frame before and a frame after; empty unless asked for, and at the default time.
     assets: path of a drawn prim → path of the component that it is part of; empty unless asked for.
     resolution, pixel_aspect, conform, data_window: of the stage's UsdRenderSettings, where it names one; the window
         is (xmin, ymin, xmax, ymax), 0..1 over the image, y up.
@@ -51,13 +54,24 @@ class Scene:
     meters_per_unit: float = 0.01
     up_axis: str = "Y"
     frame: float | None = None
+    moves: bool = False
     frames_per_second: float = 24.0
     resolution: tuple[int, int] | None = None
     pixel_aspect: float = 1.0
     assets: Mapping[str, str] = field(default_factory=dict)
+    labels: Mapping[str, str] = field(default_factory=dict)
+    neighbours: tuple[Moment, ...] = ()
     conform: ConformPolicy = "expandAperture"
     data_window: tuple[float, float, float, float] = WHOLE_IMAGE
     rendering_space: str | None = None
+
+    def draws_like(self, other: Scene) -> bool:
+        """Are the same prims drawn as often with the same materials, wherever they are?"""
+        return self._drawn == other._drawn
+
+    @cached_property
+    def _drawn(self) -> list[tuple]:
+        return [(d.paths, len(d.world_from_object), d.subsets) for d in self.drawables]
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:

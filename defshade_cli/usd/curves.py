@@ -18,7 +18,7 @@ from defshade_cli.usd.basis import LARGEST_DETAIL, CurveSamples, Kind, sample_cu
 from defshade_cli.usd.points import read_widths
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.positions import read_positions
-from defshade_cli.usd.primvars import Authored, authored, fit, read_display, read_uvs
+from defshade_cli.usd.primvars import DISPLAY_COLOR, Authored, authored, fit, read_display, read_uvs
 from defshade_cli.usd.tubes import ribbons, tubes
 from defshade_cli.usd.values import integers
 
@@ -32,7 +32,9 @@ _DETAILS = ((LARGEST_DETAIL, 12), (4, 6), (2, 3))
 """Samples a segment of cubic curves, and sides of tubes."""
 
 
-def read_curves(curves: UsdGeom.BasisCurves, time: Usd.TimeCode, issues: list[str]) -> Polygons:
+def read_curves(
+    curves: UsdGeom.BasisCurves, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR
+) -> Polygons:
     """All curves of the prim, each a face in the sense of `Polygons.faces`. Bad data becomes issues."""
     points = read_positions(curves.GetPrim(), time)
     counts = integers(curves.GetCurveVertexCountsAttr().Get(time) or [])
@@ -45,7 +47,7 @@ def read_curves(curves: UsdGeom.BasisCurves, time: Usd.TimeCode, issues: list[st
     samples, sides = _detailed(kind, counts, len(points))
     if samples.left_out:
         issues.append(f"{samples.left_out} curves are left out: they have too few points, or cannot be closed")
-    return _build(curves, samples, points, sides, time, issues)
+    return _build(curves, samples, points, sides, time, issues, color)
 
 
 def _complete(counts: NDArray[np.integer], available: int, issues: list[str]) -> NDArray[np.int64]:
@@ -80,6 +82,7 @@ def _build(
     sides: int,
     time: Usd.TimeCode,
     issues: list[str],
+    color: str,
 ) -> Polygons:
     prim = curves.GetPrim()
 
@@ -90,7 +93,7 @@ def _build(
     shape = tubes(samples, centres, radii, sides) if normals is None else ribbons(samples, centres, radii, normals)
     shape = replace(
         shape,
-        display_color=read_display(prim, "displayColor", 3, time, samples.elements, issues),
+        display_color=read_display(prim, color, 3, time, samples.elements, issues),
         display_opacity=read_display(prim, "displayOpacity", 1, time, samples.elements, issues),
         uvs=read_uvs(prim, time, samples.elements, issues),
     )

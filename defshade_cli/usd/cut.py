@@ -47,7 +47,8 @@ class Cut:
     def _fits(self, polygons: Polygons) -> bool:
         names = ("counts", "indices", "faces", "holes", "display_color", "display_opacity", "left_handed")
         same = all(getattr(polygons, name) is getattr(self.polygons, name) for name in names)
-        return same and list(polygons.uvs.items()) == list(self.polygons.uvs.items())
+        named = (list(of.uvs.items()) + list(of.shown.items()) for of in (polygons, self.polygons))
+        return same and next(named) == next(named)
 
 
 def cut(polygons: Polygons, faces: Faces, path: str) -> Cut:
@@ -70,6 +71,7 @@ def cut(polygons: Polygons, faces: Faces, path: str) -> Cut:
         display_color=place(color) if varies(color) else None,
         display_opacity=place(opacity) if varies(opacity) else None,
         uvs={name: place(uv) for name, uv in whole.uvs.items()},
+        primvars={name: place(primvar) for name, primvar in whole.shown.items()},
     )
     return Cut(polygons, faces, split, *faces.sort(mesh), tuple(issues))
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdLux
 
+from defshade_cli.scene.environment import SkyLayout
 from defshade_cli.spaces import Matrix
 
 _Z_UP = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], np.float64)
@@ -15,17 +18,17 @@ def is_dome(prim: Usd.Prim) -> bool:
     return prim.IsA(UsdLux.DomeLight) or prim.IsA(UsdLux.DomeLight_1)
 
 
-def sky_texture(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[str | None, str | None]:
-    """The file of the sky's image at `time`; or none, and why where one is authored."""
+def sky_texture(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[str | None, SkyLayout, str | None]:
+    """The file of the sky's image at `time` and its layout; or none, and why where one is authored."""
     asset = prim.GetAttribute("inputs:texture:file").Get(time) or Sdf.AssetPath()
     layout = prim.GetAttribute("inputs:texture:format").Get(time)
     if not asset.path:
-        return None, None
-    if layout not in ("automatic", "latlong"):
-        return None, f"a texture of format {layout} is ignored"
+        return None, "automatic", None
     if not asset.resolvedPath:
-        return None, f"the texture {asset.path} is not found"
-    return asset.resolvedPath, None
+        return None, "automatic", f"the texture {asset.path} is not found"
+    if layout not in get_args(SkyLayout):
+        return asset.resolvedPath, "automatic", f"there is no texture format {layout}: automatic is taken"
+    return asset.resolvedPath, layout, None
 
 
 def pole(prim: Usd.Prim) -> Matrix:

@@ -27,7 +27,14 @@ from defshade_cli.usd.nurbs import PATCH_ATTRIBUTES, read_patch
 from defshade_cli.usd.points import POINTS_ATTRIBUTES, read_points
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.positions import is_carried_by_velocities, read_positions
-from defshade_cli.usd.primvars import find_display, find_uvs
+from defshade_cli.usd.primvars import (
+    DISPLAY_COLOR,
+    Elements,
+    count_elements,
+    find_display,
+    find_uvs,
+    read_shown,
+)
 from defshade_cli.usd.refiner import Refiner
 from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.subsets import FaceGroup, Faces, material_subsets, read_faces
@@ -85,16 +92,21 @@ class Gprim:
     cut: Cut
 
 
-def read_surface(prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
+def read_surface(
+    prim: Usd.Prim, time: Usd.TimeCode, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = ()
+) -> Surface | None:
     """The surface of `prim`; None for a type that is no supported surface. Bad data becomes issues, never raises.
 
     A surface of which nothing can be drawn has no groups, and issues that say why.
+    color: primvar to take for displayColor.  shown: primvars for layers.
     """
     issues: list[str] = []
     path = str(prim.GetPath())
-    polygons, copies = _read_shape(prim, time, issues)
+    polygons, copies = _read_shape(prim, time, issues, color)
     if polygons is None:
         return None
+    if shown:
+        polygons = replace(polygons, shown=read_shown(prim, shown, time, _elements(polygons), issues))
     control = read_control(UsdGeom.Mesh(prim), polygons, time, issues) if prim.IsA(UsdGeom.Mesh) else None
     faces = read_faces(prim, time, issues)
     opacity = _constant(polygons.display_opacity)
@@ -110,6 +122,12 @@ def read_surface(prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
         display_opacity=None if opacity is None else float(opacity),
         issues=tuple(Unsupported(path, issue) for issue in issues),
     )
+
+
+def _elements(polygons: Polygons) -> Elements:
+    """Of polygons as they were read; values of faces and corners fit none from which broken faces were left out."""
+    whole = np.array_equal(polygons.faces, np.arange(len(polygons.counts)))
+    return count_elements(whole * len(polygons.counts), len(polygons.points), whole * len(polygons.indices))
 
 
 def tessellate(surface: Surface, refiner: Refiner | None = None, last: Gprim | None = None) -> Gprim:
@@ -132,23 +150,24 @@ def move_surface(surface: Surface, prim: Usd.Prim, time: Usd.TimeCode) -> Surfac
     return replace(surface, polygons=replace(polygons, points=points))
 
 
-def only_points_vary(prim: Usd.Prim) -> bool:
+def only_points_vary(prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = ()) -> bool:
     """Is a mesh, if anything of it varies, the same but for its points?"""
-    return prim.IsA(UsdGeom.Mesh) and varying_names(prim) <= {"points", "velocities", "accelerations"}
+    return prim.IsA(UsdGeom.Mesh) and varying_names(prim, color, shown) <= {"points", "velocities", "accelerations"}
 
 
-def is_time_varying(prim: Usd.Prim) -> bool:
-    return bool(varying_names(prim))
+def is_time_varying(prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = ()) -> bool:
+    return bool(varying_names(prim, color, shown))
 
 
-def varying_names(prim: Usd.Prim) -> set[str]:
+def varying_names(prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = ()) -> set[str]:
     """Of what read_surface reads, primvars inherited and face subsets included, what may differ over time."""
     primvars = (
         UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals"),
         UsdGeom.PrimvarsAPI(prim).GetPrimvar("widths"),
-        find_display(prim, "displayColor"),
+        find_display(prim, color),
         find_display(prim, "displayOpacity"),
         *find_uvs(prim),
+        *(UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name) for name in shown),
     )
     subsets = (subset.GetIndicesAttr() for subset in material_subsets(prim))
     sources = (*(prim.GetAttribute(name) for name in _attributes(prim)), *primvars, *subsets)
@@ -157,16 +176,18 @@ def varying_names(prim: Usd.Prim) -> set[str]:
     return names | {"velocities"} if carried else names
 
 
-def _read_shape(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> tuple[Polygons | None, Copies | None]:
+def _read_shape(
+    prim: Usd.Prim, time: Usd.TimeCode, issues: list[str], color: str
+) -> tuple[Polygons | None, Copies | None]:
     if prim.IsA(UsdGeom.Mesh):
-        return read_mesh(UsdGeom.Mesh(prim), time, issues), None
+        return read_mesh(UsdGeom.Mesh(prim), time, issues, color), None
     if prim.IsA(UsdGeom.Points):
-        return read_points(UsdGeom.Points(prim), time, issues)
+        return read_points(UsdGeom.Points(prim), time, issues, color)
     if prim.IsA(UsdGeom.BasisCurves):
-        return read_curves(UsdGeom.BasisCurves(prim), time, issues), None
+        return read_curves(UsdGeom.BasisCurves(prim), time, issues, color), None
     if prim.IsA(UsdGeom.NurbsPatch):
-        return read_patch(UsdGeom.NurbsPatch(prim), time, issues), None
-    return read_solid(prim, time, issues), None
+        return read_patch(UsdGeom.NurbsPatch(prim), time, issues, color), None
+    return read_solid(prim, time, issues, color), None
 
 
 def _attributes(prim: Usd.Prim) -> tuple[str, ...]:

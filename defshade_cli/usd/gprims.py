@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pxr import Usd
 
 from defshade_cli.usd.polygons import Polygons
-from defshade_cli.usd.primvars import Elements, count_elements, read_display, read_uvs
+from defshade_cli.usd.primvars import DISPLAY_COLOR, Elements, count_elements, read_display, read_uvs
 from defshade_cli.usd.revolution import SEGMENTS, Strip, arc, disk, revolve, side
 from defshade_cli.usd.values import floats
 
@@ -91,7 +91,7 @@ def size_attributes(prim: Usd.Prim) -> tuple[str, ...]:
     return names
 
 
-def read_solid(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> Polygons | None:
+def read_solid(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR) -> Polygons | None:
     """The gprim tessellated; None for any other type, no faces where a size is no size."""
     if prim.GetTypeName() not in _GPRIMS:
         return None
@@ -104,7 +104,7 @@ def read_solid(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> Polygon
     elements = _elements(polygons)
     return replace(
         _along(polygons, _SPINE[axis]),
-        display_color=read_display(prim, "displayColor", 3, time, elements, issues),
+        display_color=read_display(prim, color, 3, time, elements, issues),
         display_opacity=read_display(prim, "displayOpacity", 1, time, elements, issues),
         uvs=read_uvs(prim, time, elements, issues),
     )

@@ -1,10 +1,10 @@
-"""What a drawn prim is part of."""
+"""What a drawn prim is, and what it is part of."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from pxr import Kind, Sdf, Usd
+from pxr import Kind, Sdf, Usd, UsdSemantics
 
 
 def read_assets(stage: Usd.Stage, paths: Iterable[str]) -> dict[str, str]:
@@ -22,3 +22,20 @@ def _component(stage: Usd.Stage, path: Sdf.Path, known: dict[Sdf.Path, Sdf.Path]
         else:
             known[path] = _component(stage, path.GetParentPath(), known)
     return known[path]
+
+
+def read_labels(stage: Usd.Stage, paths: Iterable[str], time: Usd.TimeCode) -> dict[str, str]:
+    """For each path that has any, its own and inherited semantic labels: `class:chair,furniture part:leg`.
+
+    Taxonomies and their labels stand in alphabetic order, so that equal sets are equal texts.
+    """
+    prims = ((path, stage.GetPrimAtPath(path)) for path in paths)
+    labels = {path: _labels(prim, time) for path, prim in prims if prim}
+    return {path: text for path, text in labels.items() if text}
+
+
+def _labels(prim: Usd.Prim, time: Usd.TimeCode) -> str:
+    taxonomies = sorted(str(name) for name in UsdSemantics.LabelsAPI.ComputeInheritedTaxonomies(prim))
+    queries = ((name, UsdSemantics.LabelsQuery(name, time)) for name in taxonomies)
+    found = ((name, sorted(map(str, query.ComputeUniqueInheritedLabels(prim)))) for name, query in queries)
+    return " ".join(f"{name}:{','.join(labels)}" for name, labels in found if labels)

@@ -26,6 +26,7 @@ from defshade_cli.scene.light import (
     SphereLight,
 )
 from defshade_cli.scene.scene import Unsupported
+from defshade_cli.scene.shadow import ShadowStyle
 from defshade_cli.usd.dome import is_dome, pole, sky_texture
 from defshade_cli.usd.light_files import with_files
 from defshade_cli.usd.mesh_light import Glow, is_mesh_light, read_glow
@@ -65,8 +66,8 @@ def read_light(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Light | Glow | None,
     """
     path = str(prim.GetPath())
     if is_dome(prim):
-        texture, problem = sky_texture(prim, time)
-        dome = DomeLight(path=path, world_from_light=pole(prim), texture=texture, **_common(prim, time))
+        texture, layout, problem = sky_texture(prim, time)
+        dome = DomeLight(path=path, world_from_light=pole(prim), texture=texture, layout=layout, **_common(prim, time))
         return dome, tuple(Unsupported(path, reason) for reason in [problem, *_left_out(prim, time)] if reason)
     for schema, light_class, sizes in _CLASSES:
         if prim.IsA(schema):
@@ -107,16 +108,26 @@ def _common(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any]:
     color = np.array(_input(prim, "color", time), np.float64)
     if _input(prim, "enableColorTemperature", time):
         color = color * temperature_color(_input(prim, "colorTemperature", time))
-    casts_shadow = _input(prim, "shadow:enable", time) if prim.HasAPI(UsdLux.ShadowAPI) else True
+    has_shadow = prim.HasAPI(UsdLux.ShadowAPI)
+    shadow = {"casts_shadow": _input(prim, "shadow:enable", time), "shadow": _shadow(prim, time)} if has_shadow else {}
     values = {name: _input(prim, name, time) for name in ("intensity", "exposure", "normalize", "diffuse", "specular")}
     shaping = _shaping(prim, time) if prim.HasAPI(UsdLux.ShapingAPI) else None
-    return {"color": color, "shaping": shaping, "casts_shadow": casts_shadow, "group": _group(prim)} | values
+    return {"color": color, "shaping": shaping, "group": _group(prim)} | shadow | values
 
 
 def _group(prim: Usd.Prim) -> str:
     """The light group, in the first of the ways to say it; empty without one."""
     values = (attribute.Get() for name in _GROUP_ATTRIBUTES if (attribute := prim.GetAttribute(name)))
     return next((str(value) for value in values if value), "")
+
+
+def _shadow(prim: Usd.Prim, time: Usd.TimeCode) -> ShadowStyle:
+    return ShadowStyle(
+        color=tuple(_input(prim, "shadow:color", time)),
+        distance=_input(prim, "shadow:distance", time),
+        falloff=_input(prim, "shadow:falloff", time),
+        gamma=_input(prim, "shadow:falloffGamma", time),
+    )
 
 
 def _shaping(prim: Usd.Prim, time: Usd.TimeCode) -> Shaping:

@@ -9,7 +9,7 @@ of which nothing is lost.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from defshade_cli.scene.scene import Unsupported
 from defshade_cli.scene.texture import TextureInput
 from defshade_cli.usd.materialx.models import MODELS, translate
 from defshade_cli.usd.network import Network, computed, node_of
+from defshade_cli.usd.primvars import DISPLAY_COLOR
 from defshade_cli.usd.texture import Unreadable, read_texture_input
 
 _FIELDS = {
@@ -46,6 +47,8 @@ _WITHOUT_EFFECT = ("occlusion",)
 _DEFAULTS = {f.name: f.default for f in fields(Material)}
 _CHANNELS = {"r": slice(0, 1), "g": slice(1, 2), "b": slice(2, 3), "a": slice(3, 4)}
 _READER = "UsdPrimvarReader_"
+_FROM_PRIMVARS = ("diffuseColor", "opacity")
+_DISPLAY_OPACITY = "displayOpacity"
 _PREVIEW_SURFACE = "UsdPreviewSurface"
 _MATERIALX = "mtlx"
 
@@ -108,7 +111,7 @@ def _surface_of(material: UsdShade.Material) -> tuple[UsdShade.Shader, str]:
 
 
 def _not_understood(path: str, reason: str) -> ReadMaterial:
-    material = Material(path, uses_display_color=UNBOUND.uses_display_color)
+    material = replace(UNBOUND, path=path)
     return ReadMaterial(material, understood=False, issues=(Unsupported(path, reason),))
 
 
@@ -143,11 +146,11 @@ def _take(inputs: _Inputs, name: str, value: Any) -> None:
 
 
 def _take_from_node(inputs: _Inputs, name: str, output: Usd.Attribute) -> None:
-    """A value that a node computes: a texture or displayColor; of all others the authored fallback is taken."""
+    """A value that a node computes: a texture or a primvar; where it has none, and of all other nodes, the fallback."""
     node, identifier = node_of(output)
     varname = inputs.network.value(node, "varname") if identifier.startswith(_READER) else None
-    if name == "diffuseColor" and varname == "displayColor":
-        inputs.values["uses_display_color"] = True
+    if name in _FROM_PRIMVARS and varname:
+        _take_from_primvar(inputs, name, node, str(varname))
         return
     _take(inputs, name, _fallback(inputs.network, node, output.GetBaseName()))
     if identifier == "UsdUVTexture" and _FIELDS.get(name) in TEXTURED_FIELDS:
@@ -155,8 +158,20 @@ def _take_from_node(inputs: _Inputs, name: str, output: Usd.Attribute) -> None:
             inputs.textures[_FIELDS[name]] = read_texture_input(inputs.network, output)
         except Unreadable as reason:
             inputs.left_out.append(f"{name} ({reason})")
-    elif not (name == "opacity" and varname == "displayOpacity"):
+    else:
         inputs.left_out.append(f"{name} (primvar {varname})" if varname else f"{name} ({identifier})")
+
+
+def _take_from_primvar(inputs: _Inputs, name: str, node: UsdShade.Shader, varname: str) -> None:
+    """Any primvar for the colour; for the opacity displayOpacity alone."""
+    _take(inputs, name, _fallback(inputs.network, node, "result"))
+    if name == "diffuseColor":
+        inputs.values["uses_display_color"] = True
+        inputs.values["color_primvar"] = "" if varname == DISPLAY_COLOR else varname
+    elif varname == _DISPLAY_OPACITY:
+        inputs.values["uses_display_opacity"] = True
+    else:
+        inputs.left_out.append(f"{name} (primvar {varname})")
 
 
 def _fallback(network: Network, node: UsdShade.Shader, channel: str) -> Any:

@@ -12,8 +12,10 @@ from defshade_cli.usd.binding import Bindings, read_bindings
 from defshade_cli.usd.geometry import Surface, is_time_varying, move_surface, only_points_vary, read_surface
 from defshade_cli.usd.kind import Kinds
 from defshade_cli.usd.material import ReadMaterial, read_material
+from defshade_cli.usd.primvars import DISPLAY_COLOR
 from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.skel import Rigs
+from defshade_cli.usd.subsets import material_subsets
 
 
 class Memory:
@@ -48,11 +50,12 @@ class Memory:
 
     def _at_another_time(self, known: Surface, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
         """Read is no more than varies; what turns out to be equal stays the same object."""
-        moved = move_surface(known, prim, time) if known.groups and only_points_vary(prim) else None
+        shown = self._color_primvar(prim, time), self._extras.primvars
+        moved = move_surface(known, prim, time) if known.groups and only_points_vary(prim, *shown) else None
         return shared(moved or self._read_surface(prim, time), known)
 
     def _read_surface(self, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
-        surface = read_surface(prim, time)
+        surface = read_surface(prim, time, self._color_primvar(prim, time), self._extras.primvars)
         return None if surface is None else self._as_shown(surface, prim.GetPath())
 
     def stand_in(self, prim: Usd.Prim, mode: str) -> Surface:
@@ -61,6 +64,13 @@ class Memory:
         if key not in self._stand_ins:
             self._stand_ins[key] = self._as_shown(self._models.read(prim, mode), prim.GetPath())
         return self._stand_ins[key]
+
+    def _color_primvar(self, prim: Usd.Prim, time: Usd.TimeCode) -> str:
+        """What stands for displayColor: the primvar that a material bound to the prim reads its colour from."""
+        paths = (prim.GetPath(), *(subset.GetPath() for subset in material_subsets(prim)))
+        bound = (material for path in paths for material in self.bindings(path).candidates)
+        read = (self.material(path, time).material.color_primvar for path in bound)
+        return next((name for name in read if name), DISPLAY_COLOR)
 
     def material(self, path: Sdf.Path, time: Usd.TimeCode) -> ReadMaterial:
         if path in self._materials:
@@ -93,7 +103,8 @@ class Memory:
         """Asked only when a second frame is read."""
         path = prim.GetPath()
         if path not in self._time_varying:
-            self._time_varying[path] = is_time_varying(prim)
+            color = self._color_primvar(prim, Usd.TimeCode.Default())
+            self._time_varying[path] = is_time_varying(prim, color, self._extras.primvars)
         return self._time_varying[path]
 
     def _as_shown(self, surface: Surface, path: Sdf.Path) -> Surface:

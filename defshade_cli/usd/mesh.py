@@ -9,7 +9,16 @@ from pxr import Usd, UsdGeom
 from defshade_cli.usd.normals import mend_normals
 from defshade_cli.usd.polygons import SCHEMES, Polygons, Primvar, Scheme
 from defshade_cli.usd.positions import read_positions
-from defshade_cli.usd.primvars import Authored, Elements, authored, count_elements, fit, read_display, read_uvs
+from defshade_cli.usd.primvars import (
+    DISPLAY_COLOR,
+    Authored,
+    Elements,
+    authored,
+    count_elements,
+    fit,
+    read_display,
+    read_uvs,
+)
 from defshade_cli.usd.values import integers
 
 MESH_ATTRIBUTES = ("points", "faceVertexCounts", "faceVertexIndices", "holeIndices", "normals")
@@ -18,7 +27,7 @@ MESH_ATTRIBUTES = ("points", "faceVertexCounts", "faceVertexIndices", "holeIndic
 _NONE = np.empty(0, np.int32)
 
 
-def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> Polygons:
+def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR) -> Polygons:
     """The mesh as authored, before refinement: faces that cannot be drawn are left out, holes stay."""
     points = _points(mesh, time, issues)
     counts, indices = _topology(mesh, time, issues) if len(points) else (_NONE, _NONE)
@@ -33,7 +42,7 @@ def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> Poly
         scheme=scheme,
         left_handed=mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded,
         normals=_normals(mesh, time, elements, issues) if scheme == "none" else None,
-        display_color=read_display(mesh.GetPrim(), "displayColor", 3, time, elements, issues),
+        display_color=read_display(mesh.GetPrim(), color, 3, time, elements, issues),
         display_opacity=read_display(mesh.GetPrim(), "displayOpacity", 1, time, elements, issues),
         uvs=read_uvs(mesh.GetPrim(), time, elements, issues),
     )

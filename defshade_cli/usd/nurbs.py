@@ -15,7 +15,7 @@ from scipy.interpolate import BSpline
 
 from defshade_cli.usd.normals import mend_normals
 from defshade_cli.usd.polygons import Polygons, Primvar
-from defshade_cli.usd.primvars import Elements, read_display, read_uvs
+from defshade_cli.usd.primvars import DISPLAY_COLOR, Elements, read_display, read_uvs
 from defshade_cli.usd.values import floats
 
 PATCH_ATTRIBUTES = (
@@ -47,7 +47,9 @@ class _Direction:
         return (spline.derivative() if derivative else spline)(self.at)
 
 
-def read_patch(patch: UsdGeom.NurbsPatch, time: Usd.TimeCode, issues: list[str]) -> Polygons:
+def read_patch(
+    patch: UsdGeom.NurbsPatch, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR
+) -> Polygons:
     """The whole patch; trim curves are not cut. Bad data becomes issues."""
     prim = patch.GetPrim()
     if patch.GetTrimCurveCountsAttr().Get(time):
@@ -64,7 +66,7 @@ def read_patch(patch: UsdGeom.NurbsPatch, time: Usd.TimeCode, issues: list[str])
     surface = replace(
         _grid(points, -normals if left_handed else normals),
         left_handed=left_handed,
-        **_lying(prim, time, elements, issues),
+        **_lying(prim, time, elements, issues, color),
     )
     return mend_normals(surface.with_primvars(lambda p: p if p is surface.normals else _sampled(p, u, v)), [])
 
@@ -127,9 +129,9 @@ def _grid(points: Array, normals: Array) -> Polygons:
     )
 
 
-def _lying(prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> dict:
+def _lying(prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: list[str], color: str) -> dict:
     return {
-        "display_color": read_display(prim, "displayColor", 3, time, elements, issues),
+        "display_color": read_display(prim, color, 3, time, elements, issues),
         "display_opacity": read_display(prim, "displayOpacity", 1, time, elements, issues),
         "uvs": read_uvs(prim, time, elements, issues),
     }

@@ -12,7 +12,7 @@ from defshade_cli.usd.copies import Copies
 from defshade_cli.usd.gprims import sphere
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.positions import read_positions
-from defshade_cli.usd.primvars import Authored, Elements, authored, count_elements, fit, read_display
+from defshade_cli.usd.primvars import DISPLAY_COLOR, Authored, Elements, authored, count_elements, fit, read_display
 from defshade_cli.usd.values import floats
 
 POINTS_ATTRIBUTES = ("points", "widths", "ids")
@@ -26,7 +26,9 @@ _SEGMENTS = ((1_000, 32), (20_000, 16))
 _FEWEST_SEGMENTS = 8
 
 
-def read_points(points: UsdGeom.Points, time: Usd.TimeCode, issues: list[str]) -> tuple[Polygons, Copies]:
+def read_points(
+    points: UsdGeom.Points, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR
+) -> tuple[Polygons, Copies]:
     """A sphere of diameter 1, and the points that it is placed at: all that are finite."""
     positions = read_positions(points.GetPrim(), time)
     if positions is None or not len(positions):
@@ -34,7 +36,7 @@ def read_points(points: UsdGeom.Points, time: Usd.TimeCode, issues: list[str]) -
         positions = np.empty((0, 3), np.float32)
     if points.GetNormalsAttr().HasAuthoredValue():
         issues.append("normals of points are ignored: spheres are drawn")
-    copies = _copies(points, positions, time, issues)
+    copies = _copies(points, positions, time, issues, color)
     return sphere(0.5, _segments(len(copies.ids))), copies
 
 
@@ -54,10 +56,12 @@ def read_widths(prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: 
     return Primvar(np.full(1, FALLBACK_WIDTH, np.float32), "constant")
 
 
-def _copies(points: UsdGeom.Points, positions: NDArray[np.float32], time: Usd.TimeCode, issues: list[str]) -> Copies:
+def _copies(
+    points: UsdGeom.Points, positions: NDArray[np.float32], time: Usd.TimeCode, issues: list[str], primvar: str
+) -> Copies:
     prim, count = points.GetPrim(), len(positions)
     elements = count_elements(1, count, count)
-    color = read_display(prim, "displayColor", 3, time, elements, issues)
+    color = read_display(prim, primvar, 3, time, elements, issues)
     opacity = read_display(prim, "displayOpacity", 1, time, elements, issues)
     widths = np.broadcast_to(read_widths(prim, time, elements, issues).values, (count,))
     drawn = np.isfinite(positions).all(axis=1) & np.isfinite(widths)

@@ -51,6 +51,7 @@ class Polygons:
     left_handed: the corners run clockwise seen from outside.
     normals: None where they follow from the shape.
     uvs: texture coordinates (N, 2) by name.
+    shown: primvars (N, 1 to 4) by name that only layers show.
     """
 
     points: NDArray[np.float32]
@@ -64,11 +65,12 @@ class Polygons:
     display_color: Primvar | None = None
     display_opacity: Primvar | None = None
     uvs: Mapping[str, Primvar] = field(default_factory=dict)
+    shown: Mapping[str, Primvar] = field(default_factory=dict)
 
     @property
     def primvars(self) -> tuple[Primvar, ...]:
         """All that lies on the faces, points and corners."""
-        named = (self.normals, self.display_color, self.display_opacity, *self.uvs.values())
+        named = (self.normals, self.display_color, self.display_opacity, *self.uvs.values(), *self.shown.values())
         return tuple(primvar for primvar in named if primvar is not None)
 
     @cached_property
@@ -131,6 +133,7 @@ class Polygons:
             display_color=changed(self.display_color),
             display_opacity=changed(self.display_opacity),
             uvs={name: change(uv) for name, uv in self.uvs.items()},
+            shown={name: change(primvar) for name, primvar in self.shown.items()},
         )
 
     def without_holes(self) -> Polygons:

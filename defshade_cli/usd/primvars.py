@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -12,6 +12,8 @@ from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.usd.polygons import Interpolation, Primvar
 from defshade_cli.usd.values import floats, integers
+
+DISPLAY_COLOR = "displayColor"
 
 Elements = Mapping[str, int]
 """How many values each interpolation needs."""
@@ -43,7 +45,7 @@ def authored(primvar: UsdGeom.Primvar, time: Usd.TimeCode) -> Authored | None:
 
 
 def find_display(prim: Usd.Prim, name: str) -> UsdGeom.Primvar:
-    """displayColor or displayOpacity: the prim's own, or an ancestor's where that is constant."""
+    """displayColor, displayOpacity or what is read in their place: the prim's own, or an ancestor's constant."""
     return UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
 
 
@@ -62,7 +64,7 @@ def read_uvs(prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: lis
 def read_display(
     prim: Usd.Prim, name: str, width: int, time: Usd.TimeCode, elements: Elements, issues: list[str]
 ) -> Primvar | None:
-    """displayColor or displayOpacity, all finite; None where there is none or it does not fit."""
+    """displayColor, displayOpacity or what is read in their place, all finite; None where there is none that fits."""
     return _fit_finite(authored(find_display(prim, name), time), width, elements, issues)
 
 
@@ -107,3 +109,28 @@ def _resolved(source: Authored, width: int) -> NDArray[np.float32] | str:
     if indices is None or (len(indices) and not 0 <= indices.min() <= indices.max() < len(values)):
         return "its indices are out of range"
     return values[indices]
+
+
+def read_shown(
+    prim: Usd.Prim, names: Iterable[str], time: Usd.TimeCode, elements: Elements, issues: list[str]
+) -> dict[str, Primvar]:
+    """The primvars that layers show, by name: one to four numbers a value, (N, 1 to 4)."""
+    read = {}
+    for name in names:
+        source = authored(UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name), time)
+        width = _width(source)
+        primvar = _fit_finite(source, width, elements, issues) if width else None
+        if primvar is not None:
+            read[name] = replace(primvar, values=primvar.values.reshape(len(primvar.values), -1))
+        elif source is not None and not width:
+            issues.append(f"{source.name} is left out: no layer shows its type")
+    return read
+
+
+def _width(source: Authored | None) -> int:
+    """Numbers in a value, 0 for what is none, or more than four."""
+    array = np.asarray(None if source is None else source.value)
+    if array.dtype.kind not in "iufb" or array.ndim > 2:
+        return 0
+    width = array.shape[-1] if array.ndim == 2 else 1
+    return width if width <= 4 else 0

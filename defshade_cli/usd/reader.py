@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
+from itertools import cycle
 
 import numpy as np
 from pxr import Usd
@@ -14,14 +16,14 @@ from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
 from defshade_cli.scene.light import Light
-from defshade_cli.scene.material import UNBOUND
+from defshade_cli.scene.motion import Moment, moment_of
 from defshade_cli.scene.scene import Scene, Unsupported
 from defshade_cli.settings import Complexity
 from defshade_cli.usd import stage as facts
 from defshade_cli.usd.camera import choose_camera, find_cameras, framed_camera, read_camera
 from defshade_cli.usd.complexity import View, choose_levels
 from defshade_cli.usd.geometry import Gprim, Surface
-from defshade_cli.usd.identity import read_assets
+from defshade_cli.usd.identity import read_assets, read_labels
 from defshade_cli.usd.instancing import Piece
 from defshade_cli.usd.light import camera_light
 from defshade_cli.usd.linking import link
@@ -29,6 +31,7 @@ from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.mesh_light import Glow, Glows, glowing_lights, shown_material
 from defshade_cli.usd.palette import Palette
 from defshade_cli.usd.settings import read_settings
+from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.tessellation import Tessellation
 from defshade_cli.usd.traversal import Traversal
 from defshade_cli.usd.unresolved import find_unresolved
@@ -42,10 +45,13 @@ Glowing = tuple[Glow, tuple[Light, ...]]
 class StageReader:
     """Reads frames of one stage. What does not change over time is read once, and stays the same object.
 
-    camera: path or name; without it the rule of usd/camera.py picks.  purposes: of the geometry that is drawn.
+    camera: path or name; without it the rule of usd/camera.py picks.
+    purposes: of the geometry that is drawn; without them those of the render settings.
+    render_settings, product: paths of their prims; settings are found as usd/products.py does.
     complexity: of subdivision surfaces; for `auto` it matters how large the image is, see scene.camera.image_size.
     extras: what only some layers need.
-    Raises PrimNotFound for a camera that the stage lacks.
+    beside: a reader of the same stage, whose memory is shared.
+    Raises PrimNotFound for a camera or render settings that the stage lacks.
     """
 
     def __init__(
@@ -53,18 +59,23 @@ class StageReader:
         stage: Usd.Stage,
         *,
         camera: str | None = None,
-        purposes: Sequence[str] = ("default", "render"),
+        purposes: Sequence[str] | None = None,
+        render_settings: str | None = None,
+        product: str = "",
         complexity: Complexity = "auto",
         size: tuple[int, int] | None = None,
         width: int | None = None,
         extras: Extras = NO_EXTRAS,
+        beside: StageReader | None = None,
     ) -> None:
-        self._stage, self._purposes = stage, tuple(purposes)
         self._complexity, self._size, self._width = complexity, size, width
         self._extras = extras
-        self._memory = Memory(stage, extras)
-        self._tessellation = Tessellation()
-        self._settings = read_settings(stage)
+        self._memory: Memory = beside._memory if beside else Memory(stage, extras)
+        self._tessellation: Tessellation = beside._tessellation if beside else Tessellation()
+        self._settings = read_settings(stage, render_settings, product)
+        self._stage, self._purposes = stage, tuple(purposes or self._settings.purposes)
+        self._levels: dict[str, int] = {}
+        self._lights: dict[str, Light] = {}
         self._cameras = find_cameras(stage)
         self._issues = tuple(arc.unsupported for arc in find_unresolved(stage))
         self._camera = choose_camera(stage, self._cameras, camera, self._settings.camera)
@@ -86,22 +97,44 @@ class StageReader:
         """
         time = Usd.TimeCode.Default() if frame is None else Usd.TimeCode(frame)
         with facts.gathered_diagnostics():
-            scene = self._read(frame, time)
+            levels = self._levels = {}
+            scene = self._read(frame, time, levels)
+            if self._extras.motion and frame is not None:
+                neighbours = tuple(self._moment(scene, frame + step, levels) for step in (-1.0, 1.0))
+                scene = replace(scene, neighbours=neighbours)
         return _lit(scene)
 
-    def _read(self, frame: float | None, time: Usd.TimeCode) -> Scene:
+    def read_shutter(self, scene: Scene, count: int) -> Iterator[Scene]:
+        """The frame of `scene` again and again, at `count` times of its shutter in turn, without end.
+
+        Surfaces are refined as often as at the frame itself.
+        """
+        assert scene.frame is not None
+        for offset in cycle(scene.camera.shutter_times(count)):
+            time = Usd.TimeCode(scene.frame + offset)
+            with facts.silence():
+                yield _lit(self._read(scene.frame, time, self._levels))
+
+    def _moment(self, scene: Scene, frame: float, levels: dict[str, int]) -> Moment:
+        """What `scene` has, as it is at another frame, refined alike."""
+        then = self._read(frame, Usd.TimeCode(frame), levels)
+        return moment_of(scene.drawables, scene.meshes, then.camera, then.drawables, then.meshes)
+
+    def _read(self, frame: float | None, time: Usd.TimeCode, levels: dict[str, int]) -> Scene:
+        """levels: of refinement by path of the surface; those that are missing are chosen, and put in."""
         traversal = Traversal(self._stage, self._memory, time, self._purposes)
         pieces = traversal.read_stage()
         drawn = tuple(_drawn(pieces, self._purposes))
         if not drawn and not traversal.dormant:
             raise EmptyStage(_empty(self._stage, traversal.issues))
         camera, camera_issues = self._read_camera(time, drawn)
-        gprims = self._tessellate(drawn, camera)
+        gprims = self._tessellate(drawn, camera, levels)
         palette = Palette(self._memory, time)
         meshes: dict[Mesh, int] = {}
         glowing = _glowing(drawn, gprims, traversal.glows, palette)
         shown = [*_drawables(drawn, gprims, meshes, palette, glowing)]
-        lights, drawables = link(self._stage, [*_lights(pieces), *_all(glowing)], shown)
+        shining = self._shared_lights([*_lights(pieces), *_all(glowing)])
+        lights, drawables = link(self._stage, shining, shown)
         mended = dict.fromkeys(issue for gprim in gprims.values() for issue in gprim.issues)
         return Scene(
             name=facts.stage_name(self._stage),
@@ -116,14 +149,26 @@ class StageReader:
             meters_per_unit=facts.meters_per_unit(self._stage),
             up_axis=facts.up_axis(self._stage),
             frame=frame,
+            moves=frame is not None and camera.shutter[0] < camera.shutter[1] and self._may_change,
             frames_per_second=facts.frames_per_second(self._stage),
             resolution=self._settings.resolution,
             pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
             data_window=self._settings.data_window,
+            labels=read_labels(self._stage, _paths(drawables), time) if self._extras.labels else {},
             assets=read_assets(self._stage, _paths(drawables)) if self._extras.assets else {},
             rendering_space=self._settings.rendering_space,
         )
+
+    @cached_property
+    def _may_change(self) -> bool:
+        return facts.may_change(self._stage)
+
+    def _shared_lights(self, lights: Iterable[Light]) -> list[Light]:
+        """Lights that are as they were when last read are the same objects."""
+        found = [shared(light, self._lights.get(light.path)) for light in lights]
+        self._lights = {light.path: light for light in found}
+        return found
 
     def _read_camera(
         self, time: Usd.TimeCode, drawn: Iterable[PlacedSurface]
@@ -135,13 +180,18 @@ class StageReader:
         camera, issues = read_camera(self._camera, time)
         return self._settings.applied_to(camera), issues
 
-    def _tessellate(self, drawn: Iterable[PlacedSurface], camera: Camera) -> dict[Surface, Gprim]:
+    def _tessellate(
+        self, drawn: Iterable[PlacedSurface], camera: Camera, levels: dict[str, int]
+    ) -> dict[Surface, Gprim]:
         width, height = image_size(camera.aspect, self._size, self._width, self._settings.resolution)
         aspect = width * self._settings.pixel_aspect_for(camera) / height
         view = View(camera.conformed(aspect, self._settings.conform), height)
         placed = ((surface, piece.root_from_object) for piece, surface in drawn)
-        levels = choose_levels(placed, self._complexity, view)
-        return {surface: self._tessellation.at_level(surface, level) for surface, level in levels.items()}
+        chosen = choose_levels(placed, self._complexity, view)
+        return {
+            surface: self._tessellation.at_level(surface, levels.setdefault(surface.path, level))
+            for surface, level in chosen.items()
+        }
 
 
 def _drawn(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[PlacedSurface]:
@@ -167,15 +217,15 @@ def _drawables(
             glow, lights = glowing[piece]
             materials = [shown_material(material, glow, lights[0]) for material in materials]
         numbered = zip(gprim.groups, map(palette.number_of, materials), strict=True)
-        subsets = (Subset(number, group.first, group.count) for group, number in numbered)
+        subsets = tuple(Subset(number, group.first, group.count) for group, number in numbered)
         yield Drawable(
             mesh=meshes.setdefault(gprim.mesh, len(meshes)),
             world_from_object=piece.root_from_object,
-            subsets=tuple(subsets),
+            subsets=subsets,
             paths=piece.paths,
             instance_ids=piece.ids,
-            display_color=np.nan_to_num(piece.display_color, nan=UNBOUND.diffuse_color[0]),
-            display_opacity=np.nan_to_num(piece.display_opacity, nan=UNBOUND.opacity),
+            display_color=np.where(np.isnan(piece.display_color), materials[0].diffuse_color, piece.display_color),
+            display_opacity=np.nan_to_num(piece.display_opacity, nan=materials[0].opacity),
         )
 
 

@@ -11,6 +11,7 @@ from pxr import Usd, UsdRender
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.window import WHOLE_IMAGE
 from defshade_cli.spaces import ConformPolicy
+from defshade_cli.usd.products import find_settings
 
 log = logging.getLogger("defshade")
 
@@ -29,6 +30,7 @@ class StageSettings:
     camera: prim path.
     pixel_aspect: width over height of a pixel; None lets the image cover the camera's aperture exactly.
     data_window: (xmin, ymin, xmax, ymax), 0..1 over the image, y up.
+    purposes: of the geometry that is drawn.
     rendering_space: colour space that the image is rendered in.
     instantaneous: the shutter closes when it opens.
     """
@@ -38,6 +40,7 @@ class StageSettings:
     pixel_aspect: float | None = 1.0
     conform: ConformPolicy = "expandAperture"
     data_window: tuple[float, float, float, float] = WHOLE_IMAGE
+    purposes: tuple[str, ...] = ("default", "render")
     rendering_space: str | None = None
     motion_blur: bool = True
     instantaneous: bool = False
@@ -56,15 +59,16 @@ class StageSettings:
         return camera.aspect * height / width
 
 
-def read_settings(stage: Usd.Stage) -> StageSettings:
-    """The settings that the stage's renderSettingsPrimPath names, else the only RenderSettings prim below /Render.
+def read_settings(stage: Usd.Stage, path: str | None = None, product: str = "") -> StageSettings:
+    """The settings at `path`, or what usd.products.find_settings finds; what is authored on `product` goes before them.
 
-    Where the settings have a single product, what is authored on the product goes before them.
+    Raises PrimNotFound for a path without settings.
     """
-    settings = UsdRender.Settings.GetStageRenderSettings(stage) or _only_settings(stage)
+    settings = find_settings(stage, path)
     if not settings:
         return StageSettings()
-    prims = (*_only_product(settings), settings.GetPrim())
+    own = stage.GetPrimAtPath(product) if product else None
+    prims = (own, settings.GetPrim()) if own else (settings.GetPrim(),)
     width, height = _value(prims, "resolution")
     policy = str(_value(prims, "aspectRatioConformPolicy"))
     stretch = policy == UsdRender.Tokens.adjustPixelAspectRatio
@@ -74,24 +78,12 @@ def read_settings(stage: Usd.Stage) -> StageSettings:
         pixel_aspect=None if stretch else max(float(_value(prims, "pixelAspectRatio")), 0.0) or 1.0,
         conform=next((known for known in _POLICIES if known == policy), "expandAperture"),
         data_window=tuple(_value(prims, "dataWindowNDC")),
+        purposes=tuple(str(name) for name in settings.GetIncludedPurposesAttr().Get()),
         rendering_space=settings.GetRenderingColorSpaceAttr().Get() or None,
         motion_blur=not _value(prims, "disableMotionBlur"),
         instantaneous=bool(_value(prims, "instantaneousShutter")),
         depth_of_field=not _value(prims, "disableDepthOfField"),
     )
-
-
-def _only_settings(stage: Usd.Stage) -> UsdRender.Settings | None:
-    folder = stage.GetPrimAtPath("/Render")
-    found = [prim for prim in Usd.PrimRange(folder) if prim.IsA(UsdRender.Settings)] if folder else []
-    return UsdRender.Settings(found[0]) if len(found) == 1 else None
-
-
-def _only_product(settings: UsdRender.Settings) -> tuple[Usd.Prim, ...]:
-    stage = settings.GetPrim().GetStage()
-    targets = settings.GetProductsRel().GetForwardedTargets()
-    product = stage.GetPrimAtPath(targets[0]) if len(targets) == 1 else None
-    return (product,) if product and product.IsA(UsdRender.Product) else ()
 
 
 def _value(prims: tuple[Usd.Prim, ...], name: str) -> Any:

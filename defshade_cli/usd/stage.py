@@ -58,6 +58,31 @@ def gathered_diagnostics() -> Iterator[set[str]]:
                 log.warning("USD: %s%s", first, f" (and {len(more)} more like it)" if more else "")
 
 
+@contextmanager
+def silence() -> Iterator[None]:
+    """Say nothing inside the block: what there is to say of a frame was said when it was first read."""
+    delegate = UsdUtils.CoalescingDiagnosticDelegate()
+
+    def nothing(record: logging.LogRecord) -> bool:
+        return False
+
+    log.addFilter(nothing)
+    try:
+        yield
+    finally:
+        log.removeFilter(nothing)
+        delegate.TakeCoalescedDiagnostics()
+
+
+def may_change(stage: Usd.Stage) -> bool:
+    """Is anything of the stage animated? Attributes are asked only where splines may be: in a range of time codes."""
+    layers = stage.GetUsedLayers(includeClipLayers=True)
+    if any(layer.ListAllTimeSamples() for layer in layers):
+        return True
+    ranged = stage.HasAuthoredTimeCodeRange() and stage.GetStartTimeCode() < stage.GetEndTimeCode()
+    return ranged and any(a.HasSpline() for prim in stage.TraverseAll() for a in prim.GetAuthoredAttributes())
+
+
 def stage_name(stage: Usd.Stage) -> str:
     """The root layer's file name without suffix."""
     return PurePath(stage.GetRootLayer().GetDisplayName()).stem

@@ -20,6 +20,12 @@ struct Instance {
     uint link_set;
 };
 
+struct Motion {
+    mat4 clip_before_from_object;
+    mat4 clip_now_from_object;
+    mat4 clip_after_from_object;
+};
+
 struct Material {
     vec3 diffuse_color;
     float metallic;
@@ -33,6 +39,7 @@ struct Material {
     float opacity_threshold;
     uint use_specular_workflow;
     uint uses_display_color;
+    uint uses_display_opacity;
     uint one_sided;
     uint first_input;          // of its textures
     uint input_count;
@@ -80,6 +87,10 @@ struct Light {
     vec3 up;
     uint ies_table;            // its layer; NO_IES for none
     uint first_link;           // bits of the link sets that it lights: lib/linking.glsl
+    vec3 shadow_color;         // what a full shadow leaves of the light
+    float shadow_distance;     // of the farthest occluder; negative for no limit
+    float shadow_fading;       // depth of the zone before it in which shadows fade
+    float shadow_gamma;
     vec2 ies_vertical;         // the profile is read at x * angle + y radians
 };
 
@@ -88,4 +99,5 @@ struct ShadowMap {
     vec4 tile;                 // place in the atlas: offset and size, texture coordinates
     float texel;               // width of a texel one unit ahead; of every texel for a distant light
     float resolution;          // texels a side
+    vec2 depth_coefficients;   // depth z: 1 / z, or z for a distant light, = x * stored + y
 };

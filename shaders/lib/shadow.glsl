@@ -15,6 +15,24 @@ uint cube_face(vec3 direction) {
 // Towards the light, in texels: clears float32 rounding. The maps' own depth offset keeps surfaces from shadowing themselves.
 const float LIGHT_OFFSET = 0.02;
 
+#ifdef SHADOW_STYLES
+// UsdLuxShadowAPI: how much of each texel's shadow is left at a receiver of depth `receiver` in the map. What the map
+// knows is the occluder nearest to the light.
+vec4 shadow_strength(Light light, ShadowMap map, vec4 stored, float receiver, vec3 position) {
+    if (light.shadow_distance < 0.0) return vec4(1.0);
+    vec4 occluders = map.depth_coefficients.x * stored + map.depth_coefficients.y;
+    float own = map.depth_coefficients.x * receiver + map.depth_coefficients.y;
+#ifdef VOLUME_QUAD
+    vec4 apart = own - occluders;
+#else
+    vec4 apart = length(light.position - position) * (1.0 - own / occluders);
+#endif
+    vec4 left = light.shadow_distance - apart;
+    if (light.shadow_fading <= 0.0) return vec4(greaterThanEqual(left, vec4(0.0)));
+    return pow(clamp(left / light.shadow_fading, 0.0, 1.0), vec4(light.shadow_gamma));
+}
+#endif
+
 // Share of the light that reaches a relative position: the four nearest texels, bilinearly.
 float visibility(Light light, vec3 position, vec3 l) {
     if (light.shadow_count == 0u) return 1.0;
@@ -27,6 +45,9 @@ float visibility(Light light, vec3 position, vec3 l) {
     within = clamp(within, 0.5, map.resolution - 0.5);
     vec4 stored = textureGather(shadow_atlas, map.tile.xy + within / map.resolution * map.tile.zw, 0);
     vec4 lit = vec4(lessThanEqual(stored, vec4(ndc.z)));
+#ifdef SHADOW_STYLES
+    lit = 1.0 - (1.0 - lit) * shadow_strength(light, map, stored, ndc.z, position);
+#endif
     vec2 t = fract(within - 0.5);
     vec2 row = mix(lit.wx, lit.zy, t.x);
     return mix(row.x, row.y, t.y);

@@ -32,31 +32,30 @@ __all__ = [
     "with_output",
 ]
 
-_RENDER = RenderSettings()
-
 
 def takes_stage(function: Function) -> Function:
     """Give a command the options of stage and image: it is called with a RenderJob and its own keywords."""
-    return _takes([_scene_argument(), *stage_options(), *image_options(_RENDER.layers)], function)
+    return _takes([_scene_argument(), *stage_options(), *image_options()], function)
 
 
-def takes_job(*, layers: Sequence[str] = _RENDER.layers, name: str = "{scene}") -> Callable[[Function], Function]:
+def takes_job(*, layers: Sequence[str] = (), name: str = "{scene}") -> Callable[[Function], Function]:
     """Give a command every option of a render: it is called with a RenderJob and a Reporting.
 
-    layers: written when the user names none.  name: of the output, without frame and suffix, likewise.
+    layers: written when the user names none; without them what the stage names.
+    name: of the output, without frame and suffix, likewise; with layers of its own the command has a name of its own.
     """
 
     def decorate(function: Function) -> Function:
         @functools.wraps(function)
         def command(job: RenderJob, **values: Any) -> Any:
-            return function(with_output(job, name), Reporting(**take(values, Reporting)), **values)
+            return function(with_output(job, name, fixed=bool(layers)), Reporting(**take(values, Reporting)), **values)
 
         return _takes([_scene_argument(), *render_options(layers, name)], command)
 
     return decorate
 
 
-def render_options(layers: Sequence[str] = _RENDER.layers, name: str = "{scene}") -> list[Function]:
+def render_options(layers: Sequence[str] = (), name: str = "{scene}") -> list[Function]:
     """Every option of a render, with the defaults that takes_job tells of."""
     return [*stage_options(), *image_options(layers), *output_options(name), *run_options()]
 
@@ -95,10 +94,11 @@ def take(values: dict[str, Any], owner: Any) -> dict[str, Any]:
     return {name: values.pop(name) for name in owner.__dataclass_fields__ if name in values}
 
 
-def with_output(job: RenderJob, name: str) -> RenderJob:
-    """`job` with the default file name where the user gave none."""
-    patterns = job.output.patterns or (f"{name}.####.exr" if len(job.frames) > 1 else f"{name}.exr",)
-    return replace(job, output=replace(job.output, patterns=patterns))
+def with_output(job: RenderJob, name: str, *, fixed: bool = False) -> RenderJob:
+    """`job` with the default file name where the user gave none. fixed: whatever names the stage's products have."""
+    fallback = f"{name}.####.exr" if len(job.frames) > 1 else f"{name}.exr"
+    patterns = job.output.patterns or (fallback,) * fixed
+    return replace(job, output=replace(job.output, patterns=patterns, fallback=fallback))
 
 
 def _scene_argument() -> Function:

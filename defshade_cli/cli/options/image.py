@@ -16,7 +16,7 @@ from defshade_cli.settings import RenderSettings
 _RENDER = RenderSettings()
 
 
-def image_options(layers: Sequence[str]) -> list[Function]:
+def image_options(layers: Sequence[str] = ()) -> list[Function]:
     """Under the heading Image. layers: written when the user names none."""
     option = functools.partial(click.option, cls=Option, heading="Image")
     return [
@@ -43,8 +43,8 @@ def image_options(layers: Sequence[str]) -> list[Function]:
             "--layers",
             type=Layers(),
             metavar="NAMES",
-            default=tuple(layers),
-            default_text=",".join(layers),
+            default=tuple(layers) or None,
+            default_text=",".join(layers) or "what the stage's product names, else beauty",
             help="Layers to write, with commas between, of those listed below or by their names in Hydra, "
             "Arnold and Blender; 'all' for all that are listed.",
         ),

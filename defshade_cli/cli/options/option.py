@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from defshade_cli.image.layers import ALIASES, FAMILIES, LAYERS
+from defshade_cli.image.layers import ALIASES, FAMILIES, LAYERS, Layer
 
 Function = Callable[..., Any]
 
@@ -41,8 +41,13 @@ def epilog(*examples: str, layers: bool = False) -> str:
     paragraphs = ["\b\nExamples:\n" + "\n".join(f"  {example}" for example in examples)]
     if layers:
         rows = [*LAYERS.items(), *((layer.name, layer) for layer in FAMILIES.values())]
-        lines = (f"  {name:<20}{''.join(layer.channels):<6}{layer.summary}" for name, layer in rows)
+        lines = (f"  {name:<20}{_channels(layer):<7}{layer.summary}" for name, layer in rows)
         paragraphs.append("\b\nLayers:\n" + "\n".join(lines))
         known_as = (f"{theirs} {ours}" for theirs, ours in ALIASES.items())
         paragraphs.append("Other names of layers: " + ", ".join(known_as) + ".")
     return "\n\n".join(paragraphs)
+
+
+def _channels(layer: Layer) -> str:
+    """RGB; of a Cryptomatte with its many channels the first."""
+    return "".join(layer.channels) if len(layer.channels) <= 4 else f"{layer.channels[0]}…"

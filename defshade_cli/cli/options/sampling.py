@@ -22,8 +22,7 @@ def sampling_options() -> list[Function]:
         option(
             "--samples",
             type=click.IntRange(min=1),
-            default=_RENDER.samples,
-            default_text=str(_RENDER.samples),
+            default_text=f"1, and {settings.MOST_SAMPLES} with --max-error or --time-limit",
             metavar="N",
             help="Samples a pixel of the beauty: places in the pixel, on the lens and on every light. "
             "Data layers are one sample at the pixel's centre.",
@@ -38,6 +37,19 @@ def sampling_options() -> list[Function]:
             "1 takes every light for a point.",
         ),
         option(
+            "--max-error",
+            type=Positive(),
+            metavar="ERROR",
+            help="End once 95 % of the image's tiles have this relative standard error, such as 0.01; --samples is the "
+            "most that a pixel gets then. A tile that has it gets no more samples.",
+        ),
+        option(
+            "--time-limit",
+            type=Positive(),
+            metavar="SECONDS",
+            help="End a frame once it has been drawn for so long; --samples is the most that a pixel gets then.",
+        ),
+        option(
             "--filter",
             type=click.Choice(tuple(settings.FILTERS)),
             default=_RENDER.filter,
@@ -50,5 +62,11 @@ def sampling_options() -> list[Function]:
             metavar="PIXELS",
             default_text=_WIDTHS,
             help="Width of the filter, from end to end.",
+        ),
+        option(
+            "--motion-blur/--no-motion-blur",
+            default=_RENDER.motion_blur,
+            default_text="--motion-blur",
+            help="Whether several samples see the stage at as many times while the camera's shutter is open.",
         ),
     ]

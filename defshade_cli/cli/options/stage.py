@@ -10,9 +10,8 @@ import click
 from defshade_cli import settings
 from defshade_cli.cli.options.option import Function, Option
 from defshade_cli.cli.types import Frames, Names, PrimPaths, Variant
-from defshade_cli.settings import Composition, RenderSettings
+from defshade_cli.settings import Composition
 
-_RENDER = RenderSettings()
 _COMPOSITION = Composition()
 
 
@@ -31,13 +30,25 @@ def stage_options() -> list[Function]:
             metavar="FRAMES",
             help="Time codes: 1:10x2,15 is 1 3 5 7 9 15. The default is the stage's first frame.",
         ),
+        option(
+            "--settings",
+            "render_settings",
+            metavar="PRIM",
+            help="RenderSettings or RenderPass of the stage. The default is what the stage names, else the first below "
+            "/Render.",
+        ),
+        option(
+            "--product",
+            metavar="PATH|NAME",
+            help="The one product of the render settings to make. The default is all, or the first where -o has no "
+            "{product}.",
+        ),
         option("--default-time", is_flag=True, help="Read default values in place of a frame's."),
         option(
             "--purposes",
             type=Names("purpose", settings.PURPOSES),
             metavar="NAMES",
-            default=_RENDER.purposes,
-            default_text=",".join(_RENDER.purposes),
+            default_text="the stage's render settings, else default,render",
             help=f"Purposes to draw, with commas between, of: {', '.join(settings.PURPOSES)}.",
         ),
         *_composition_options(),

@@ -13,7 +13,7 @@ import OpenImageIO as oiio
 from defshade_cli.image.colour import Pixels
 from defshade_cli.image.encoders.sink import bounded, make_spec, opened, set_attributes
 from defshade_cli.image.film import Film
-from defshade_cli.image.layers import BEAUTY, LAYERS, MAIN_PART
+from defshade_cli.image.layers import BEAUTY, MAIN_PART
 from defshade_cli.image.metadata import exr_attributes
 from defshade_cli.settings import Compression, OutputSettings
 
@@ -59,11 +59,12 @@ def write_exr(film: Film, names: tuple[str, ...], output: OutputSettings, path: 
 
 
 def _part(film: Film, names: tuple[str, ...], output: OutputSettings) -> _Part:
-    halves = {name for name in names if LAYERS[name].is_color and not output.full_float}
+    halves = {name for name in names if film.row(name).is_color and not output.full_float}
     planes = tuple(bounded(name, film.layers[name], half=name in halves) for name in names)
     spec = _spec(film, names, halves, output.compression)
     if output.multipart:
-        spec.attribute("oiio:subimagename", MAIN_PART if names == (BEAUTY,) else LAYERS[names[0]].exr_name)
+        row = film.row(names[0])
+        spec.attribute("oiio:subimagename", MAIN_PART if row.name == BEAUTY else row.exr_name)
     if output.tiled or output.mipmaps:
         spec.tile_width = spec.tile_height = TILE
     if output.mipmaps:
@@ -78,14 +79,14 @@ def _spec(film: Film, names: tuple[str, ...], halves: set[str], compression: Com
     spec.channelnames = channels
     if len(set(types)) > 1:
         spec.channelformats = tuple(oiio.TypeDesc(kind) for kind in types)
-    spec.set_colorspace(film.render_space.interop_id if any(LAYERS[name].is_color for name in names) else "data")
-    spec.attribute("compression", _lossless_for_data(compression, names))
+    spec.set_colorspace(film.render_space.interop_id if any(film.row(name).is_color for name in names) else "data")
+    spec.attribute("compression", _lossless_for_data(compression, film, names))
     set_attributes(spec, exr_attributes(film, names))
     return spec
 
 
-def _lossless_for_data(compression: Compression, names: tuple[str, ...]) -> Compression:
-    data = [name for name in names if not LAYERS[name].is_color and _DWA_LOSSY & LAYERS[name].suffixes]
+def _lossless_for_data(compression: Compression, film: Film, names: tuple[str, ...]) -> Compression:
+    data = [name for name in names if not film.row(name).is_color and _DWA_LOSSY & film.row(name).suffixes]
     if compression != "dwaa" or not data:
         return compression
     log.warning("dwaa would blur the data in %s: this file is compressed with zip", ", ".join(data))

@@ -12,7 +12,6 @@ import numpy as np
 from defshade_cli.image.colour import display_transform, picture
 from defshade_cli.image.encoders.sink import bounded, make_spec, opened, set_attributes
 from defshade_cli.image.film import Film
-from defshade_cli.image.layers import LAYERS
 from defshade_cli.image.metadata import text_attributes
 from defshade_cli.settings import OutputSettings
 
@@ -55,7 +54,7 @@ PICTURES = {
 
 def write_picture(film: Film, name: str, output: OutputSettings, path: Path) -> None:
     """Write the layer `name` as it looks. Raises OSError with the reason."""
-    form, layer = PICTURES[path.suffix.lower()], LAYERS[name]
+    form, layer = PICTURES[path.suffix.lower()], film.row(name)
     pixels = bounded(name, film.layers[name], half=layer.is_color)
     transform = display_transform(output.display, output.view, output.look, film.render_space)
     shown = picture(layer, pixels, transform, alpha=form.alpha)

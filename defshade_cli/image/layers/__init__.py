@@ -6,7 +6,7 @@ names   what other renderers call them, and how a request becomes rows
 
 from defshade_cli.image.layers.layer import BEAUTY, ID, MAIN_PART, SCENE_LINEAR, SCENE_UNITS, UNIT_VECTOR, Layer
 from defshade_cli.image.layers.names import ALIASES, LAYERS, in_order, layer_in_file, resolve
-from defshade_cli.image.layers.table import DEFAULT_GROUP, FAMILIES, LIGHT_FAMILY
+from defshade_cli.image.layers.table import DEFAULT_GROUP, FAMILIES, LIGHT_FAMILY, PRIMVAR_FAMILY
 
 __all__ = [
     "ALIASES",
@@ -17,6 +17,7 @@ __all__ = [
     "LAYERS",
     "LIGHT_FAMILY",
     "MAIN_PART",
+    "PRIMVAR_FAMILY",
     "SCENE_LINEAR",
     "SCENE_UNITS",
     "UNIT_VECTOR",

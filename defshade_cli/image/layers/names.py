@@ -14,7 +14,19 @@ ALIASES: dict[str, str] = {
     # Hydra: HdAovTokens
     "color": "beauty",
     "cameraDepth": "depth",
-    "primvars:st": "uv",
+    # RenderMan
+    "Ci": "beauty",
+    "a": "alpha",
+    "z": "depth",
+    "Nn": "normal",
+    # Karma
+    "C": "beauty",
+    "ray:hitP": "position",
+    "ray:hitN": "normal",
+    "ray:hitPz": "depth",
+    # files
+    "rgba": "beauty",
+    "rgb": "beauty",
     # Arnold
     "RGBA": "beauty",
     "A": "alpha",
@@ -23,6 +35,7 @@ ALIASES: dict[str, str] = {
     "N": "normal",
     "Ng": "geometricNormal",
     "ID": "primId",
+    "motionvector": "motionForward",
     "crypto_object": "cryptoObject",
     "crypto_material": "cryptoMaterial",
     "crypto_asset": "cryptoAsset",
@@ -38,6 +51,7 @@ ALIASES: dict[str, str] = {
     "Shadow": "shadow",
     "DiffCol": "albedo",
     "Emit": "emission",
+    "Vector": "motionForward",
     "IndexMA": "materialId",
     "CryptoObject": "cryptoObject",
     "CryptoMaterial": "cryptoMaterial",

@@ -37,6 +37,15 @@ def _direction(name: str, space: str, source: str, summary: str) -> Layer:
     return Layer(name, _XYZ, UNIT_VECTOR, space, source, 0.0, False, summary)
 
 
+def _motion(name: str, whither: str, first: int) -> Layer:
+    summary = f"what is seen here, {whither}"
+    return Layer(name, ("U", "V"), "pixels a frame", "raster, y up", "motion", 0.0, False, summary, first)
+
+
+def _statistic(name: str, unit: str, summary: str) -> Layer:
+    return Layer(name, ("Y",), unit, "none", "lighting", 0.0, True, summary)
+
+
 def _id(name: str, source: str, summary: str) -> Layer:
     return Layer(name, ("ID",), ID, "none", source, -1.0, False, summary)
 
@@ -66,6 +75,8 @@ ROWS: dict[str, Layer] = {
         _direction("geometricNormal", "world", "facet", "normal of the triangle, facing the camera"),
         _direction("tangent", "world", "tangent", "where u grows, across the shading normal; 0 without uv"),
         Layer("uv", ("U", "V"), "texture coordinates", "none", "uv", 0.0, False, "primvar st, else the first there is"),
+        _statistic("variance", "scene-linear²", "variance of the beauty's luminance, as a mean of samples"),
+        _statistic("sampleCount", "samples", "samples of the beauty"),
         _color("albedo", "base", "diffuse colour of the material before metallic darkens it"),
         _scalar("metallic", "base", "metalness", first=3),
         _scalar("roughness", "normal", "perceptual roughness; GGX alpha is its square", first=3),
@@ -74,20 +85,26 @@ ROWS: dict[str, Layer] = {
         _scalar("clearcoat", "clearcoat", "amount of clearcoat"),
         _scalar("clearcoatRoughness", "clearcoat", "perceptual roughness of the clearcoat", first=1),
         _scalar("occlusion", "occlusion", "the material's occlusion; direct light does not see it", background=1.0),
+        _motion("motionForward", "to where it is a frame later", 2),
+        _motion("motionBackward", "to where it was a frame before", 0),
         _id("primId", "visible", "the prim: the manifest has its path"),
         _id("instanceId", "visible", "which instance of the prim; −1 for what is none"),
         _id("elementId", "visible", "the face of the mesh as authored"),
         _id("materialId", "visible", "the material: the manifest has its path"),
+        _id("semantic", "visible", "what the prim is: the manifest has its labels"),
         _matte("cryptoObject", "Cryptomatte of prims"),
         _matte("cryptoMaterial", "Cryptomatte of materials"),
         _matte("cryptoAsset", "Cryptomatte of components, as model kinds have them"),
     )
 }
 
-LIGHT_FAMILY = "light:"
+LIGHT_FAMILY, PRIMVAR_FAMILY = "light:", "primvars:"
 DEFAULT_GROUP = f"{LIGHT_FAMILY}default"
 
 FAMILIES: dict[str, Layer] = {
+    PRIMVAR_FAMILY: Layer(
+        f"{PRIMVAR_FAMILY}NAME", (*_XYZ, "W"), "as authored", "as authored", "primvar", 0.0, False, "a primvar"
+    ),
     LIGHT_FAMILY: _light(f"{LIGHT_FAMILY}GROUP", "light of a group: by name, light's name or path; * matches any"),
 }
 """Rows for any number of layers, by how their names begin."""

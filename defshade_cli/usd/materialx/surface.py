@@ -15,9 +15,9 @@ from defshade_cli.usd.materialx.graph import Graph, Unread
 from defshade_cli.usd.materialx.nodes import NODES
 from defshade_cli.usd.materialx.signal import NonLinear, Signal, constant
 from defshade_cli.usd.network import Network, computed, node_of
+from defshade_cli.usd.primvars import DISPLAY_COLOR
 
 _LETTERS = "rgba"
-_DISPLAY_COLOR = "displayColor"
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,13 +103,14 @@ class Translation:
         self.put(target, last, names[-1])
 
     def put_base(self, name: str, weight: str) -> None:
-        """diffuse_color; displayColor where the network reads nothing else."""
+        """diffuse_color; a primvar where the network reads nothing else."""
         source = self.network.source(self.shader, name)
         if source is not None and computed(source):
             node, identifier = node_of(source)
             attribute = "varname" if "UsdPrimvarReader" in identifier else "geomprop"
-            if self.network.value(node, attribute) == _DISPLAY_COLOR:
+            if varname := self.network.value(node, attribute):
                 self.values["uses_display_color"] = True
+                self.values["color_primvar"] = "" if varname == DISPLAY_COLOR else str(varname)
                 return
         self.put_product("diffuse_color", weight, name) if weight else self.put("diffuse_color", self[name], name)
 

@@ -1,0 +1,62 @@
+"""What full-screen passes draw: the whole image, or those of its tiles that still need samples."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.targets import Target
+
+WHOLE = np.array([[0.0, 0.0, 1.0, 1.0]], np.float32)
+"""The one region that is all of the image: left, top, right, bottom as shares of it."""
+
+
+class Screen:
+    """Rectangles that shaders/screen.vert draws as instances of one quad."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._regions = gpu.keep(gpu.context.buffer(WHOLE.tobytes()))
+        self._count = 1
+
+    def cover(self, regions: NDArray[np.float32]) -> None:
+        """Draw the (R, 4) regions from now on: left, top, right, bottom as shares of the image."""
+        self._regions.orphan(max(regions.nbytes, WHOLE.nbytes))
+        self._regions.write(np.ascontiguousarray(regions, np.float32))
+        self._count = len(regions)
+
+    def array(self, program: moderngl.Program) -> moderngl.VertexArray:
+        """For a program whose vertex shader is screen.vert, or reads `region` like it."""
+        return self._gpu.keep(self._gpu.context.vertex_array(program, [(self._regions, "4f/i", "region")]))
+
+    def draw(self, array: moderngl.VertexArray) -> None:
+        if self._count:
+            array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=self._count)
+
+
+class TileMask:
+    """Keeps passes away from tiles that are done: a depth there that fragments fail before they are shaded."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._context = gpu.context
+        self._finished = Screen(gpu)
+        self._program = gpu.shaders.program("screen.vert", "depth.frag")
+        self._array = self._finished.array(self._program)
+        self.hide(WHOLE[:0])
+
+    def hide(self, regions: NDArray[np.float32]) -> None:
+        """The (R, 4) regions that are done."""
+        self._finished.cover(regions)
+        self.is_empty = not len(regions)
+
+    def fill(self, target: Target, depth: float) -> None:
+        """Write one depth there; what the colours hold there is undefined afterwards."""
+        if self.is_empty:
+            return
+        target.framebuffer.use()
+        self._context.enable_only(moderngl.DEPTH_TEST)
+        self._context.depth_func = "1"
+        self._program["screen_depth"] = depth
+        self._finished.draw(self._array)

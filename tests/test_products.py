@@ -1,0 +1,215 @@
+"""UsdRender: settings, products and variables, from the prims to the files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import OpenImageIO as oiio
+import pytest
+from click.testing import CliRunner, Result
+
+from defshade_cli.cli.render import render
+from defshade_cli.errors import DefshadeError, EmptyStage, UsageError
+from defshade_cli.farm.shots import make_shot
+from defshade_cli.image.layers.variables import layer_of
+from defshade_cli.scene.product import Product, Variable
+from defshade_cli.settings import OutputSettings, RenderJob
+from defshade_cli.usd.products import read_products
+from defshade_cli.usd.stage import open_stage
+
+STAGE = """#usda 1.0
+( renderSettingsPrimPath = "/Render/final" )
+def Cube "cube" {}
+def Cube "hidden" {
+    uniform token purpose = "proxy"
+}
+def DistantLight "sun" {}
+def Camera "front" {
+    float2 clippingRange = (0.1, 100)
+    double3 xformOp:translate = (0, 0, 8)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}
+def Camera "side" {
+    float2 clippingRange = (0.1, 100)
+    double3 xformOp:translate = (8, 0, 0)
+    float xformOp:rotateY = 90
+    uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:rotateY"]
+}
+def Scope "Render" {
+    def RenderSettings "final" {
+        rel camera = </front>
+        int2 resolution = (32, 18)
+        rel products = [</Render/wide>, </Render/aovs>, </Render/deep>]
+    }
+    def RenderSettings "draft" {
+        rel camera = </side>
+        int2 resolution = (16, 9)
+        uniform token[] includedPurposes = ["default", "proxy"]
+        rel products = </Render/wide>
+    }
+    def RenderPass "pass" {
+        rel renderSource = </Render/draft>
+    }
+    def RenderProduct "wide" {
+        token productName = "out/wide.exr"
+        rel orderedVars = [</Render/Vars/Ci>, </Render/Vars/a>]
+    }
+    def RenderProduct "aovs" {
+        rel camera = </side>
+        int2 resolution = (24, 24)
+        token productName = "aovs.exr"
+        rel orderedVars = [</Render/Vars/zed>, </Render/Vars/nrm>, </Render/Vars/odd>, </Render/Vars/lit>]
+    }
+    def RenderProduct "deep" {
+        uniform token productType = "deepRaster"
+    }
+    def Scope "Vars" {
+        def RenderVar "Ci" {
+            string sourceName = "Ci"
+        }
+        def RenderVar "a" {
+            token dataType = "float"
+        }
+        def RenderVar "zed" {
+            string sourceName = "z"
+            token dataType = "float"
+        }
+        def RenderVar "nrm" {
+            string sourceName = "Nn"
+            token dataType = "normal3f"
+        }
+        def RenderVar "odd" {
+            string sourceName = "crowdDensity"
+        }
+        def RenderVar "lit" {
+            string sourceName = "C.*"
+            token sourceType = "lpe"
+        }
+    }
+}
+"""
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    Path("shot.usda").write_text(STAGE)
+    return tmp_path
+
+
+def invoke(*arguments: str) -> Result:
+    return CliRunner().invoke(render, [*arguments, "--progress", "none"])
+
+
+def rendered(*arguments: str) -> list[str]:
+    done = invoke(*arguments)
+    assert done.exception is None, done.exception
+    return done.stdout.split()
+
+
+def spec_of(path: str) -> oiio.ImageSpec:
+    return oiio.ImageInput.open(path).spec()
+
+
+def test_every_product_is_made_under_its_name(caplog: pytest.LogCaptureFixture) -> None:
+    assert rendered("shot.usda") == ["out/wide.exr", "aovs.exr"]
+    wide, aovs = spec_of("out/wide.exr"), spec_of("aovs.exr")
+    assert ((wide.width, wide.height), sorted(wide.channelnames)) == ((32, 18), ["B", "G", "R", "a.A"])
+    assert ((aovs.width, aovs.height), sorted(aovs.channelnames)) == (
+        (24, 24),
+        ["B", "G", "R", "nrm.X", "nrm.Y", "nrm.Z", "zed.Z"],
+    )
+
+
+def test_what_is_left_out_is_told() -> None:
+    told = invoke("shot.usda").stderr
+    assert told.count("no layer answers odd (raw crowdDensity)") == 1
+    assert "/Render/deep is left out: deep images are not rendered" in told
+
+
+def test_a_product_by_name_and_settings_by_path() -> None:
+    assert rendered("shot.usda", "--product", "aovs") == ["aovs.exr"]
+    assert rendered("shot.usda", "--settings", "/Render/draft") == ["out/wide.exr"]
+    assert spec_of("out/wide.exr").width == 16
+
+
+def test_a_pass_leads_to_its_settings() -> None:
+    assert rendered("shot.usda", "--settings", "/Render/pass") == ["out/wide.exr"]
+    assert spec_of("out/wide.exr").width == 16
+
+
+def test_the_command_line_goes_before_the_stage() -> None:
+    assert rendered("shot.usda", "--size", "8x8", "--layers", "depth", "--camera", "front") == [
+        "out/wide.exr",
+        "aovs.exr",
+    ]
+    for path in ("out/wide.exr", "aovs.exr"):
+        assert (spec_of(path).width, spec_of(path).channelnames) == (8, ("depth.Z",))
+
+
+def test_an_output_holds_the_first_product_or_says_which() -> None:
+    assert rendered("shot.usda", "-o", "one.exr") == ["one.exr"]
+    assert rendered("shot.usda", "-o", "{product}.exr") == ["wide.exr", "aovs.exr"]
+
+
+def test_several_frames_have_names_of_their_own() -> None:
+    assert rendered("shot.usda", "--frames", "1:2", "--product", "aovs") == ["aovs.0001.exr", "aovs.0002.exr"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (
+            ("--settings", "/Render/none"),
+            "no render settings at '/Render/none'; the stage has /Render/final, /Render/draft",
+        ),
+        (("--product", "none"), "no product 'none'; the render settings name /Render/wide, /Render/aovs"),
+    ],
+)
+def test_what_the_stage_lacks_is_listed(arguments: tuple[str, str], told: str) -> None:
+    error = invoke("shot.usda", *arguments).exception
+    assert isinstance(error, DefshadeError) and told in str(error)
+
+
+@pytest.mark.parametrize("name", ["/etc/x.exr", "../x.exr", "a/../../x.exr"])
+def test_a_stage_writes_nowhere_but_here(name: str) -> None:
+    job = RenderJob(Path("a.usda"), output=OutputSettings(fallback="{scene}.exr"))
+    with pytest.raises(UsageError, match="outside the current folder"):
+        make_shot(job, 1.0, Product("/Render/p", name), "cam")
+
+
+@pytest.mark.parametrize(
+    ("variable", "layer"),
+    [
+        (Variable("x", "RGBA"), "beauty"),
+        (Variable("x", "P"), "position"),
+        (Variable("x", "C.*", "lpe"), "beauty"),
+        (Variable("x", "lpe: C O", "lpe"), "emission"),
+        (Variable("x", "C<RD>.<RS>L", "lpe"), None),
+        (Variable("x", "whatever"), None),
+    ],
+)
+def test_variables_as_layers(variable: Variable, layer: str | None) -> None:
+    assert layer_of(variable) == layer
+
+
+def test_products_of_animcube(assets: Path) -> None:
+    assert rendered(str(assets / "ousd_usdrecord_animcube" / "AnimCube.usda")) == ["test.exr"]
+    spec = spec_of("test.exr")
+    assert (spec.width, spec.height, sorted(spec.channelnames)) == (2048, 1080, ["B", "G", "R"])
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 4])
+def test_products_of_four_settings(number: int, assets: Path) -> None:
+    stage = assets / "arnold_render_settings_a" / "test_0203" / "data" / "scene.usda"
+    with pytest.raises(EmptyStage):
+        raise invoke(str(stage), "--settings", f"/Render/rendersettings{number}").exception or AssertionError
+    (product,) = read_products(open_stage(stage), f"/Render/rendersettings{number}", 1.0)
+    assert (product.file, [v.source for v in product.variables]) == ("testrender.tif", ["RGBA"])
+
+
+def test_a_product_is_named_by_the_frame(assets: Path) -> None:
+    stage = assets / "arnold_render_settings_a" / "test_2300" / "data" / "test.usda"
+    assert rendered(str(stage), "--frames", "1010") == ["testrender.tif"]
+    spec = spec_of("testrender.tif")
+    assert (spec.width, spec.height, spec.nchannels) == (160, 120, 4)
