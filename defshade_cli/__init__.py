@@ -14,13 +14,9 @@ __all__ = ["__version__", "render"]
 
 
 def __getattr__(name: str) -> Any:
-    """Import `render` when it is first asked for: `defshade --help` must not load a GL stack.
-
-    The import binds the module of that name here, and the function must take its place.
-    """
+    """Import `render` when it is first asked for: `defshade --help` must not load a GL stack."""
     if name == "render":
-        from defshade_cli.render import render
+        from defshade_cli.rendering import render
 
-        globals()["render"] = render
         return render
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -20,7 +20,7 @@ FLOORS = (
     ("image",),
     ("gpu",),
     ("usd", "plan", "passes"),
-    ("render", "farm", "measure"),
+    ("rendering", "farm", "measure"),
     ("cli",),
 )
 FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}

@@ -194,14 +194,14 @@ def test_file_that_is_not_usd_is_refused(folder: Path) -> None:
 
 @pytest.mark.usefixtures("package_log")
 def test_interruption_has_its_exit_code() -> None:
-    with patch("defshade_cli.render.run", side_effect=KeyboardInterrupt):
+    with patch("defshade_cli.rendering.run", side_effect=KeyboardInterrupt):
         done = defshade_here("render", "stages/triangle.usda")
     assert (done.returncode, done.stderr.strip()) == (130, "defshade: error: interrupted")
 
 
 @pytest.mark.usefixtures("package_log")
 def test_a_bug_keeps_its_traceback() -> None:
-    with patch("defshade_cli.render.run", side_effect=ZeroDivisionError), pytest.raises(ZeroDivisionError):
+    with patch("defshade_cli.rendering.run", side_effect=ZeroDivisionError), pytest.raises(ZeroDivisionError):
         defshade_here("render", "stages/triangle.usda")
 
 

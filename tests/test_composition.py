@@ -14,7 +14,7 @@ from defshade_cli.cli.inspect import inspect
 from defshade_cli.errors import PrimNotFound, StageNotFound
 from defshade_cli.farm.fingerprint import Fingerprint
 from defshade_cli.image.metadata import provenance
-from defshade_cli.render import render
+from defshade_cli.rendering import render
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Composition, RenderJob, VariantChoice
 from defshade_cli.usd.reader import StageReader

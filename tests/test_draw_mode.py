@@ -9,7 +9,7 @@ import pytest
 from pxr import Usd
 
 from defshade_cli.image.reading import read as read_image
-from defshade_cli.render import render
+from defshade_cli.rendering import render
 from defshade_cli.scene.geometry import world_boxes
 from defshade_cli.scene.scene import Scene
 from defshade_cli.usd.reader import StageReader

@@ -10,7 +10,7 @@ import pytest
 from defshade_cli.cli.options import Reporting
 from defshade_cli.cli.progress import Progress, frame_name, make_progress
 from defshade_cli.errors import StageError
-from defshade_cli.render import FrameResult, ImageResult
+from defshade_cli.rendering import FrameResult, ImageResult
 
 PROTOCOLS = {
     "alf": ["ALF_PROGRESS 0%", "ALF_PROGRESS 33%", "ALF_PROGRESS 66%", "ALF_PROGRESS 100%"],

@@ -19,7 +19,7 @@ from defshade_cli.farm.open_job import OpenJob
 from defshade_cli.farm.targets import FINGERPRINT
 from defshade_cli.image.files import remove_abandoned, write
 from defshade_cli.image.reading import read_header
-from defshade_cli.render import Renderer, run
+from defshade_cli.rendering import Renderer, run
 from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
 from films import film
 

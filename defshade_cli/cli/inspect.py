@@ -39,7 +39,7 @@ def inspect(job: RenderJob, as_json: bool, with_plan: bool) -> None:
     Cameras, lights and the volumes they are drawn as, materials, geometry, and the prims that would be left out. It
     renders nothing and needs no graphics device.
     """
-    from defshade_cli.render import examine
+    from defshade_cli.rendering import examine
 
     scene, plan = examine(job)
     if as_json:

@@ -19,7 +19,7 @@ from defshade_cli.errors import DefshadeError
 
 if TYPE_CHECKING:
     from defshade_cli.farm.tasks import Outcome
-    from defshade_cli.render import FrameResult
+    from defshade_cli.rendering import FrameResult
 
 
 class Progress:

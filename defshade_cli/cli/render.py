@@ -15,7 +15,7 @@ from defshade_cli.cli.stats import Stats
 from defshade_cli.settings import RenderJob
 
 if TYPE_CHECKING:
-    from defshade_cli.render import FrameResult
+    from defshade_cli.rendering import FrameResult
 
 log = logging.getLogger("defshade")
 
@@ -41,7 +41,7 @@ def render(job: RenderJob, reporting: Reporting) -> None:
 
 def execute(job: RenderJob, reporting: Reporting) -> None:
     """Render `job`, telling of it as `reporting` says."""
-    from defshade_cli.render import run
+    from defshade_cli.rendering import run
 
     start_logging(reporting)
     frames = max(1, len(job.frames))

@@ -16,7 +16,7 @@ from defshade_cli.settings import RenderJob
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from defshade_cli.render import FrameResult, ImageResult
+    from defshade_cli.rendering import FrameResult, ImageResult
 
 
 class Stats:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from defshade_cli.farm.tasks import Outcome
-    from defshade_cli.render import FrameResult
+    from defshade_cli.rendering import FrameResult
 
 _ROWS = 8
 

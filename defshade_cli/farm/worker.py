@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection
 
 from defshade_cli.errors import DefshadeError, GpuError
 from defshade_cli.farm.tasks import Chunk, Outcome, failed, joined
-from defshade_cli.render import Renderer, run
+from defshade_cli.rendering import Renderer, run
 
 
 def serve(connection: Connection, command: str) -> None:

@@ -4,102 +4,60 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator, Iterator
-from contextlib import ExitStack, closing, contextmanager, nullcontext
-from dataclasses import dataclass, field, fields, replace
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing, contextmanager, nullcontext
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from defshade_cli import __version__
-from defshade_cli.errors import UsageError
+from defshade_cli.errors import DefshadeError, UsageError
 from defshade_cli.farm.open_job import OpenJob
 from defshade_cli.farm.shots import Shot
 from defshade_cli.farm.targets import FINGERPRINT, check_outputs, is_done, remove_leftovers, shot_files, shot_paths
-from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.files import write
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import BEAUTY
-from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import Plan, make_plan, plan_moments
+from defshade_cli.rendering.renderer import Renderer
+from defshade_cli.rendering.results import FrameResult, ImageResult
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Composition, RenderJob, RenderSettings
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ImageResult:
-    """What became of one image.
+class _Drawn:
+    """An image that is drawn and not yet written."""
 
-    paths: the files written, or found where `skipped`.  film, plan: None where skipped.
-    seconds: wall time per step: read, plan, context, draw, write.
-    """
+    shot: Shot
+    film: Film
+    plan: Plan
+    seconds: dict[str, float]
 
-    paths: tuple[Path, ...]
-    skipped: bool = False
-    film: Film | None = None
-    plan: Plan | None = None
-    seconds: dict[str, float] = field(default_factory=dict)
+    def written(self) -> ImageResult:
+        with _timed(self.seconds, "write"):
+            files = (file for path in shot_paths(self.shot) for file in write(self.film, self.shot.job.output, path))
+            paths = tuple(files)
+        return ImageResult(paths, film=self.film, plan=self.plan, seconds=self.seconds)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FrameResult:
-    """What became of one frame: an image for each product of the stage's, or one.
-
-    startup: wall time per step before the first frame: open.
-    """
-
+class _DrawnFrame:
     frame: float | None
-    images: tuple[ImageResult, ...]
-    startup: dict[str, float] = field(default_factory=dict)
+    images: tuple[_Drawn | ImageResult, ...]
+    startup: dict[str, float]
 
-    @property
-    def paths(self) -> tuple[Path, ...]:
-        return tuple(path for image in self.images for path in image.paths)
-
-    @property
-    def skipped(self) -> bool:
-        return all(image.skipped for image in self.images)
-
-    @property
-    def seconds(self) -> dict[str, float]:
-        """Wall time per step, of all images together."""
-        steps = dict.fromkeys(step for image in self.images for step in image.seconds)
-        return self.startup | {step: sum(image.seconds.get(step, 0.0) for image in self.images) for step in steps}
-
-
-class Renderer:
-    """The Pipelines of the devices that jobs name, each made when a frame first needs it; a context manager.
-
-    One renderer serves one job after another. Closed, it can be used again.
-    """
-
-    def __init__(self) -> None:
-        self._stack = ExitStack()
-        self._pipelines: dict[int | None, Pipeline] = {}
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def pipeline(self, device: int | None) -> Pipeline:
-        """Raises GpuError."""
-        if device not in self._pipelines:
-            self._pipelines[device] = Pipeline(self._stack.enter_context(Gpu(device)))
-        return self._pipelines[device]
-
-    def close(self) -> None:
-        self._pipelines.clear()
-        self._stack.close()
+    def written(self) -> FrameResult:
+        images = tuple(image.written() if isinstance(image, _Drawn) else image for image in self.images)
+        return FrameResult(self.frame, images, self.startup)
 
 
 def run(job: RenderJob, *, command: str = "", renderer: Renderer | None = None) -> Generator[FrameResult, None, None]:
     """Render the job's frames in order, lazily. `command` goes into the files' headers.
 
     renderer: lent for the job; without it the job has its own.
-    Raises the errors of errors.py; whatever was yielded before is complete on disk.
+    A frame is written while the next one is drawn. Raises the errors of errors.py; whatever was yielded before is
+    complete on disk.
     """
     startup: dict[str, float] = {}
     with _timed(startup, "open"):
@@ -109,10 +67,7 @@ def run(job: RenderJob, *, command: str = "", renderer: Renderer | None = None) 
     check_outputs(everything)
     remove_leftovers(everything)
     with nullcontext(renderer) if renderer else Renderer() as lent:
-        for frame in opened.frames:
-            images = tuple(_render_image(shot, opened, lent, command) for shot in shots[frame])
-            yield FrameResult(frame, images, startup)
-            startup = {}
+        yield from _written_behind(_drawn_frames(opened, shots, lent, command, startup))
 
 
 def examine(job: RenderJob) -> tuple[Scene, Plan]:
@@ -150,7 +105,34 @@ def render(
     return film
 
 
-def _render_image(shot: Shot, opened: OpenJob, renderer: Renderer, command: str) -> ImageResult:
+def _drawn_frames(
+    opened: OpenJob, shots: dict[float | None, list[Shot]], renderer: Renderer, command: str, startup: dict[str, float]
+) -> Iterator[_DrawnFrame]:
+    for frame in opened.frames:
+        yield _DrawnFrame(frame, tuple(_draw(shot, opened, renderer, command) for shot in shots[frame]), startup)
+        startup = {}
+
+
+def _written_behind(frames: Iterator[_DrawnFrame]) -> Generator[FrameResult, None, None]:
+    """Each frame once it is written, which happens while the next is drawn; also if drawing that one fails."""
+    waiting: Future[FrameResult] | None = None
+    failure: DefshadeError | None = None
+    with ThreadPoolExecutor(1, "writer") as writer:
+        while failure is None:
+            try:
+                drawn = next(frames, None)
+            except DefshadeError as error:
+                drawn, failure = None, error
+            if waiting:
+                yield waiting.result()
+            if drawn is None:
+                break
+            waiting = writer.submit(drawn.written)
+    if failure:
+        raise failure
+
+
+def _draw(shot: Shot, opened: OpenJob, renderer: Renderer, command: str) -> _Drawn | ImageResult:
     job, files = shot.job, shot_files(shot)
     made_of = opened.fingerprint(shot) if files else ""
     if is_done(job, files, made_of):
@@ -164,13 +146,10 @@ def _render_image(shot: Shot, opened: OpenJob, renderer: Renderer, command: str)
     with _timed(seconds, "context"):
         pipeline = renderer.pipeline(job.device)
     with _timed(seconds, "draw"):
-        moments = plan_moments(scene, plan, reader.read_shutter(scene, plan.moments), job.settings)
+        moments = plan_moments(plan, reader.read_shutter(scene, plan.moments), job.settings)
         film = pipeline.render(scene, plan, moments)
-    with _timed(seconds, "write"):
-        facts = _provenance(shot, command) | film.metadata | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of}
-        film = replace(film, metadata=facts)
-        written = tuple(file for path in shot_paths(shot) for file in write(film, job.output, path))
-    return ImageResult(written, film=film, plan=plan, seconds=seconds)
+    facts = _provenance(shot, command) | film.metadata | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of}
+    return _Drawn(shot, replace(film, metadata=facts), plan, seconds)
 
 
 def _provenance(shot: Shot, command: str) -> dict[str, Any]:

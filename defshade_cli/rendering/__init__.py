@@ -1,0 +1,11 @@
+"""One job from its stage to its files.
+
+story      the frames of a job, one after another        results   what became of them
+renderer   the graphics devices that they are drawn on
+"""
+
+from defshade_cli.rendering.renderer import Renderer
+from defshade_cli.rendering.results import FrameResult, ImageResult
+from defshade_cli.rendering.story import examine, render, run
+
+__all__ = ["FrameResult", "ImageResult", "Renderer", "examine", "render", "run"]

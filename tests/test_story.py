@@ -1,0 +1,85 @@
+"""The frames of a job: drawn one after another, each written while the next is drawn."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import pytest
+
+from defshade_cli.errors import OutputError, StageError
+from defshade_cli.image.reading import read
+from defshade_cli.rendering import Renderer, run, story
+from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
+
+STAGE = '#usda 1.0\ndef Sphere "ball" {}\ndef DistantLight "sun" {}\n'
+
+
+@pytest.fixture
+def job(tmp_path: Path) -> RenderJob:
+    (tmp_path / "ball.usda").write_text(STAGE)
+    output = OutputSettings((str(tmp_path / "f.#.exr"),))
+    return RenderJob(tmp_path / "ball.usda", (1.0, 2.0, 3.0), settings=RenderSettings(size=(16, 9)), output=output)
+
+
+def test_a_frame_is_written_while_the_next_is_drawn(job: RenderJob, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Writing the first frame waits until the second has been drawn: in turn they would wait for ever."""
+    draw, write, second = story._draw, story.write, threading.Event()
+
+    def telling(shot, *rest):  # type: ignore[no-untyped-def]
+        drawn = draw(shot, *rest)
+        if shot.frame == 2.0:
+            second.set()
+        return drawn
+
+    def waiting(film, *rest):  # type: ignore[no-untyped-def]
+        assert film.frame != 1.0 or second.wait(timeout=60)
+        return write(film, *rest)
+
+    monkeypatch.setattr(story, "_draw", telling)
+    monkeypatch.setattr(story, "write", waiting)
+    assert [result.frame for result in run(job)] == [1.0, 2.0, 3.0]
+
+
+def test_what_is_yielded_is_on_disk(job: RenderJob) -> None:
+    for result in run(job):
+        (path,) = result.paths
+        assert read(path)["beauty"].shape == (9, 16, 4)
+
+
+def test_a_frame_that_cannot_be_drawn_loses_none_before_it(job: RenderJob, monkeypatch: pytest.MonkeyPatch) -> None:
+    draw = story._draw
+
+    def failing(shot, *rest):  # type: ignore[no-untyped-def]
+        if shot.frame == 2.0:
+            raise StageError("the camera sees nothing")
+        return draw(shot, *rest)
+
+    monkeypatch.setattr(story, "_draw", failing)
+    results = run(job)
+    assert next(results).frame == 1.0
+    with pytest.raises(StageError, match="sees nothing"):
+        next(results)
+
+
+def test_a_frame_that_cannot_be_written_ends_the_job(job: RenderJob, monkeypatch: pytest.MonkeyPatch) -> None:
+    write = story.write
+
+    def failing(film, *rest):  # type: ignore[no-untyped-def]
+        if film.frame == 2.0:
+            raise OutputError("the disk is full")
+        return write(film, *rest)
+
+    monkeypatch.setattr(story, "write", failing)
+    results = run(job)
+    assert next(results).frame == 1.0
+    with pytest.raises(OutputError, match="disk is full"):
+        next(results)
+
+
+def test_a_job_that_is_left_is_left_whole(job: RenderJob, tmp_path: Path) -> None:
+    with Renderer() as renderer:
+        results = run(job, renderer=renderer)
+        next(results)
+        results.close()
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
