@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom
 
+from defshade_cli.usd.color_space import in_rec709, is_color
 from defshade_cli.usd.polygons import Interpolation, Primvar
 from defshade_cli.usd.values import floats, integers
 
@@ -41,7 +42,9 @@ def authored(primvar: UsdGeom.Primvar, time: Usd.TimeCode) -> Authored | None:
     if not primvar or not primvar.HasValue():
         return None
     indices = primvar.GetIndices(time) if primvar.IsIndexed() else None
-    return Authored(str(primvar.GetName()), primvar.Get(time), primvar.GetInterpolation(), indices)
+    attribute, value = primvar.GetAttr(), primvar.Get(time)
+    colors = in_rec709(attribute, value) if is_color(attribute) else value
+    return Authored(str(primvar.GetName()), colors, primvar.GetInterpolation(), indices)
 
 
 def find_display(prim: Usd.Prim, name: str) -> UsdGeom.Primvar:
