@@ -5,6 +5,7 @@
 #   make lint    ruff and mypy
 #   make docs    write docs/commands.md anew from the commands
 #   make tables  measure the layouts anew, for the table in docs/lighting.md
+#   make bench-reading  measure what reading a stage costs
 #   make accuracy  measure accumulated light against Mitsuba 3, into docs/accuracy.md
 #   make wheel   build dist/*.whl
 #   make clean   remove what was built, the virtual environment too
@@ -13,7 +14,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lint docs tables accuracy wheel clean
+.PHONY: demo test lint docs tables bench-reading accuracy wheel clean
 
 PYTHON ?= python3
 BIN := .venv/bin
@@ -47,6 +48,9 @@ lint: .venv/.ready-dev
 
 docs: .venv/.ready
 	$(BIN)/python -m defshade_cli.cli.reference > docs/commands.md
+
+bench-reading: .venv/.ready
+	$(BIN)/python benchmarks/reading.py
 
 accuracy: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.accuracy docs/accuracy.md

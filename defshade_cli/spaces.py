@@ -30,6 +30,13 @@ def translation(offset: NDArray) -> Matrix:
     return matrix
 
 
+def cross(a: NDArray, b: NDArray) -> NDArray:
+    """Cross products of vectors (..., 3). np.cross takes ten times as long for a few."""
+    x, y, z = a[..., 0], a[..., 1], a[..., 2]
+    u, v, w = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
+
+
 def transform_points(b_from_a: Matrix, points: NDArray) -> NDArray[np.float64]:
     """Points (..., 3) of frame a in frame b; affine matrices only."""
     return points @ b_from_a[:3, :3].T + b_from_a[:3, 3]

@@ -26,6 +26,10 @@ out vec4 clip_before;
 out vec4 clip_now;
 out vec4 clip_after;
 #endif
+#ifdef CLIPPING_PLANES
+uniform vec4 clipping_planes[CLIPPING_PLANES];   // relative space; what has a negative distance is not seen
+out float gl_ClipDistance[CLIPPING_PLANES];
+#endif
 #ifdef DRAW_ROW
 in uint draw_row;
 flat out uint visible_row;
@@ -82,6 +86,9 @@ void main() {
 #endif
 #ifdef DRAW_ROW
     visible_row = draw_row;
+#endif
+#ifdef CLIPPING_PLANES
+    for (int i = 0; i < CLIPPING_PLANES; ++i) gl_ClipDistance[i] = dot(clipping_planes[i], vec4(position.xyz, 1.0));
 #endif
     gl_Position = view.clip_from_relative * vec4(position.xyz, 1.0);
 }

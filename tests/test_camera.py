@@ -191,9 +191,14 @@ def test_an_aperture_without_area_sees_nothing() -> None:
         camera("float horizontalAperture = 0")
 
 
-def test_clipping_planes_are_reported() -> None:
+def test_clipping_planes_are_read_as_many_as_a_driver_has() -> None:
     scene = read('def Camera "cam" {\nfloat4[] clippingPlanes = [(1, 0, 0, 0)]\n}')
-    assert reasons(scene, "/cam") == ["clippingPlanes are ignored"]
+    assert scene.unsupported == ()
+    np.testing.assert_array_equal(scene.camera.clipping_planes, [(1, 0, 0, 0)])
+    nine = ", ".join(f"(1, 0, 0, {n})" for n in range(9))
+    crowded = read(f'def Camera "cam" {{\nfloat4[] clippingPlanes = [(nan, 0, 0, 0), {nine}]\n}}')
+    assert len(crowded.camera.clipping_planes) == 8
+    assert reasons(crowded, "/cam") == ["2 of its 10 clippingPlanes are left out"]
 
 
 # The camera that frames
@@ -241,10 +246,10 @@ def test_a_stage_without_camera_is_framed() -> None:
 # Render settings
 
 
-def settings(body: str, camera: str = "", products: str = "") -> Scene:
+def settings(body: str, camera: str = "", products: str = "", **options: str) -> Scene:
     render = f'def Scope "Render" {{\ndef RenderSettings "s" {{\n{body}\n}}\n{products}\n}}'
     text = f'def Camera "cam" {{\n{camera}\n}}\n{render}'
-    return read(text)
+    return read(text, **options)
 
 
 def test_the_image_follows_the_render_settings() -> None:
@@ -259,18 +264,12 @@ def test_a_stage_without_settings_leaves_the_image_open() -> None:
     assert (scene.resolution, scene.pixel_aspect, scene.conform) == (None, 1.0, "expandAperture")
 
 
-def test_a_single_product_goes_before_the_settings() -> None:
+def test_the_product_that_is_made_goes_before_the_settings() -> None:
     product = 'def RenderProduct "p" {\nint2 resolution = (64, 48)\n}'
-    scene = settings(
-        "int2 resolution = (320, 180)\nfloat pixelAspectRatio = 2\nrel products = </Render/p>", products=product
-    )
-    assert (scene.resolution, scene.pixel_aspect) == ((64, 48), 2.0)
-
-
-def test_of_two_products_none_is_preferred() -> None:
-    products = 'def RenderProduct "p" {\nint2 resolution = (64, 48)\n}\ndef RenderProduct "q" {\n}'
-    scene = settings("int2 resolution = (320, 180)\nrel products = [</Render/p>, </Render/q>]", products=products)
-    assert scene.resolution == (320, 180)
+    body = "int2 resolution = (320, 180)\nfloat pixelAspectRatio = 2\nrel products = </Render/p>"
+    made, plain = (settings(body, products=product, product=path) for path in ("/Render/p", ""))
+    assert (made.resolution, made.pixel_aspect) == ((64, 48), 2.0)
+    assert plain.resolution == (320, 180)
 
 
 def test_pixels_may_stretch_over_the_aperture() -> None:

@@ -218,3 +218,35 @@ def Xform "Set" (kind = "assembly") {
     film = render(stage, size=(32, 16), layers=("cryptoAsset", "cryptoObject"))
     assert set(film.manifests["cryptoAsset"].values()) == {"/Set/Chair", "/Set"}
     assert "/Set/Chair/parts/leg" in film.manifests["cryptoObject"].values()
+
+
+def test_mattes_are_blurred_by_motion_and_names_keep_their_numbers(tmp_path: Path) -> None:
+    """A ball that flies across while the shutter is open, and another that appears in the middle of it."""
+    stage = tmp_path / "a.usda"
+    stage.write_text("""#usda 1.0
+(
+    startTimeCode = 1
+    endTimeCode = 2
+)
+def Sphere "late" {
+    token visibility.timeSamples = { 0.9: "invisible", 1.1: "inherited" }
+    double3 xformOp:translate = (0, 2.5, 0)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}
+def Sphere "flying" {
+    double3 xformOp:translate.timeSamples = { 0.5: (-2, 0, 0), 1.5: (2, 0, 0) }
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}
+def Camera "cam" {
+    float2 clippingRange = (1, 100)
+    double shutter:open = -0.4
+    double shutter:close = 0.4
+    double3 xformOp:translate = (0, 1, 24)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}
+""")
+    film = render(stage, frame=1.0, size=(64, 48), samples=32, layers=("beauty", "cryptoObject"))
+    coverage = film.layers["cryptoObject"][..., 1::2].sum(axis=-1)
+    np.testing.assert_allclose(coverage, film.layers["beauty"][..., 3], atol=1e-5)
+    assert set(film.manifests["cryptoObject"].values()) == {"/late", "/flying"}
+    assert ((coverage > 0.1) & (coverage < 0.9)).sum() > 30

@@ -180,3 +180,17 @@ def test_instances_bear_their_own_colour_and_vertices_theirs(pipeline: Pipeline)
     centre = albedo[31:33, 44:46].mean((0, 1))  # on the diagonal red–blue
     np.testing.assert_allclose(centre.sum(), 1.0, atol=0.15)
     assert albedo[27, 40].min() > 0.8  # the upper left corner is white
+
+
+def test_clipping_planes_cut_in_camera_space(gpu: Gpu) -> None:
+    """What is right of x = 1 and below y = 0.5 for a camera behind the quad, whose x is the world's −x."""
+    view = replace(camera(), clipping_planes=np.array([(-1.0, 0.0, 0.0, 1.0), (0.0, 2.0, 0.0, -1.0)]))
+    turned = replace(view, world_from_camera=rotated("y", 180.0) @ view.world_from_camera)
+    behind = scene([quad(half=10.0)], [sun()], view=turned)
+    plan = make_plan(behind, RenderSettings(size=(40, 40), layers=("depth", "position")))
+    layers = Pipeline(gpu).render(behind, plan).layers
+    seen = np.isfinite(layers["depth"][..., 0])
+    x, y = layers["position"][..., 0][seen], layers["position"][..., 1][seen]
+    assert (-x <= 1.0).all() and (y >= 0.5).all()
+    # The image is 5 units wide and high: 3.5 and 2 of them are left.
+    assert seen.sum() == 28 * 16

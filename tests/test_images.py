@@ -92,7 +92,7 @@ def _draw(pipeline: Pipeline, stage: str, frame: float | None, settings: RenderS
     reader = StageReader(opened, purposes=settings.purposes, complexity=settings.complexity, size=settings.size)
     scene = reader.read(reader.first_frame() if frame is None else frame)
     plan = make_plan(scene, settings)
-    moments = plan_moments(scene, plan, reader.read_shutter(scene, plan.moments), settings)
+    moments = plan_moments(plan, reader.read_shutter(scene, plan.moments), settings)
     return pipeline.render(scene, plan, moments)
 
 

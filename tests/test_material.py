@@ -259,6 +259,15 @@ def test_a_texture_with_its_coordinates_is_read(tmp_path: Path) -> None:
     np.testing.assert_allclose(color.texture_from_uv, [[0, -3, 4], [2, 0, 5]], atol=1e-12)
 
 
+def test_coordinates_in_a_circle_are_reported(tmp_path: Path) -> None:
+    (tmp_path / "wood.png").touch()
+    stage = network(tmp_path, "wood.png")
+    text = Path(stage).read_text().replace("</m/coordinates.outputs:result>", "</m/turn.outputs:result>")
+    Path(stage).write_text(text)
+    scene = StageReader(open_stage(Path(stage))).read(None)
+    assert "run in a circle" in scene.unsupported[0].reason
+
+
 def test_back_slashes_and_udim_sets_are_resolved(tmp_path: Path) -> None:
     (tmp_path / "maps").mkdir()
     for name in ("wood.png", "tile.1001.png", "tile.1012.png"):

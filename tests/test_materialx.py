@@ -238,6 +238,13 @@ def test_coordinates_are_tiled_and_named(tmp_path: Path) -> None:
     assert (found.uv, found.texture_from_uv) == ("st1", ((3, 0, 0), (0, 3, 0)))
 
 
+def test_coordinates_in_a_circle_end(tmp_path: Path) -> None:
+    image = WOOD.replace("asset", "float2 inputs:texcoord.connect = </m/place.outputs:out>\nasset")
+    circle = node("place", "ND_dot_vector2", "float2 inputs:in.connect = </m/place.outputs:out>", "float2 outputs:out")
+    found, lost = read(tmp_path, STANDARD, COLOR.format("wood"), image + circle)
+    assert not found.inputs and "circle" in lost[0]
+
+
 # Shading models
 
 

@@ -68,7 +68,7 @@ def _beauty(pipeline: Pipeline, reader: StageReader, samples: int, **options: ob
     scene = reader.read(1.0)
     settings = RenderSettings(size=(WIDTH, HEIGHT), samples=samples, **options)  # type: ignore[arg-type]
     plan = make_plan(scene, settings)
-    moments = plan_moments(scene, plan, reader.read_shutter(scene, plan.moments), settings)
+    moments = plan_moments(plan, reader.read_shutter(scene, plan.moments), settings)
     return pipeline.render(scene, plan, moments).layers["beauty"]
 
 

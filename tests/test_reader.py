@@ -183,9 +183,9 @@ def test_colors_are_the_prims_else_grey() -> None:
     text = (
         'def Cube "red" {\ncolor3f[] primvars:displayColor = [(1, 0, 0)]\nfloat[] primvars:displayOpacity = [0.5]\n}\n'
     )
-    red, grey = read(text + CUBE).drawables
-    np.testing.assert_allclose([*red.display_color[0], red.display_opacity[0]], [1, 0, 0, 0.5])
-    np.testing.assert_allclose([*grey.display_color[0], grey.display_opacity[0]], [0.18, 0.18, 0.18, 1])
+    (cubes,) = read(text + CUBE).drawables
+    np.testing.assert_allclose(cubes.display_color, [[1, 0, 0], [0.18, 0.18, 0.18]])
+    np.testing.assert_allclose(cubes.display_opacity, [0.5, 1])
 
 
 def test_the_scene_says_where_it_comes_from() -> None:

@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from build import at, bulb, camera, drawable, quad, scene, sun
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.textures import group_images
+from defshade_cli.gpu.vertices import uv_slots
 from defshade_cli.image import texture as images
 from defshade_cli.image.texture import Source, TexelImage, load_images
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
+from defshade_cli.scene.geometry import Subset
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.texture import ImageFile, Texture, TextureInput
@@ -214,6 +216,30 @@ def test_an_unreadable_file_leaves_the_constant(pipeline: Pipeline, tmp_path: Pa
     texture = plain(ImageFile(str(tmp_path / "missing.png")))
     built = textured({"diffuse_color": TextureInput(texture)}, diffuse_color=(0.25, 0.5, 0.75))
     np.testing.assert_allclose(layer(pipeline, built, "albedo"), np.full((SIDE, SIDE, 3), (0.25, 0.5, 0.75)))
+
+
+def test_subsets_may_name_different_coordinates(pipeline: Pipeline, tmp_path: Path) -> None:
+    """Each half of the quad reads its own set, in its own material."""
+    ramp = np.arange(SIDE, dtype=np.uint8)[None, :, None].repeat(SIDE, 0).repeat(3, 2) * 16
+    texture = plain(save(tmp_path / "a.png", ramp), color_space="raw", wrap_s="clamp", wrap_t="clamp")
+    materials = [Material(f"/{uv}", inputs={"diffuse_color": TextureInput(texture, uv=uv)}) for uv in ("a", "b")]
+    at_left, at_right = np.full((4, 2), 0.5 / SIDE), np.full((4, 2), 1 - 0.5 / SIDE)
+    mesh = replace(quad(), uvs={"a": at_left, "b": at_right})
+    halves = (Subset(0, 0, 1), Subset(1, 1, 1))
+    built = scene([mesh], [sun()], materials, FULL_VIEW, [replace(drawable(mesh), subsets=halves)])
+    found = layer(pipeline, built, "albedo")[..., 0]
+    np.testing.assert_allclose((found[SIDE - 2, SIDE // 2], found[1, SIDE // 2]), (0, 15 * 16 / 255), atol=2e-3)
+
+
+def test_sets_that_share_no_mesh_share_a_slot() -> None:
+    assert uv_slots([("st",), ("map1",)]) == {"st": 0, "map1": 0}
+    assert uv_slots([("st", "map1"), ("map1", "map2")]) == {"st": 0, "map1": 1, "map2": 0}
+
+
+def test_a_third_set_on_one_mesh_is_said(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING, "defshade"):
+        assert uv_slots([("a", "b", "c")]) == {"a": 0, "b": 1}
+    assert "coordinates c" in caplog.text
 
 
 # Normal maps

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.records import record
 from defshade_cli.gpu.textures import TextureSet, TextureStore, input_records
-from defshade_cli.gpu.vertices import uv_names, vertex_arrays
+from defshade_cli.gpu.vertices import in_slots, uv_names, uv_slots, vertex_arrays
 from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
@@ -107,11 +107,13 @@ class GpuScene:
         """
         layer_uv = "LAYER_UV" in inputs
         self._instances.write(instance_records(scene.drawables, scene.camera.position))
-        textures = self._update_materials(scene)
+        names_read = uv_names(scene.drawables, scene.materials, len(scene.meshes))
+        slots = uv_slots(names_read)
+        uvs = tuple(in_slots(names, slots) for names in names_read)
+        textures = self._update_materials(scene, slots)
         color_varies = any(m.display_color is not None or m.display_opacity is not None for m in scene.meshes)
         textured = bool(textures.arrays)
-        uvs = uv_names(scene.drawables, scene.materials, len(scene.meshes)) if textured else ()
-        made_for = (uvs, color_varies, textured, layer_uv, primvars)
+        made_for = (uvs if textured else (), color_varies, textured, layer_uv, primvars)
         arrays_of = partial(
             vertex_arrays, color_varies=color_varies, textured=textured, layer_uv=layer_uv, primvars=primvars
         )
@@ -138,9 +140,9 @@ class GpuScene:
             tuple(vertices), indices, self._draws[0], commands, corners, color_varies=color_varies, textures=textures
         )
 
-    def _update_materials(self, scene: Scene) -> TextureSet:
+    def _update_materials(self, scene: Scene, slots: Mapping[str, int]) -> TextureSet:
         textures = self._textures.update(scene.textures)
-        inputs, counts = input_records(scene.materials, textures)
+        inputs, counts = input_records(scene.materials, textures, slots)
         self._materials.write(material_records(scene.materials, counts))
         if textures.arrays:
             self._texture_inputs.write(inputs)

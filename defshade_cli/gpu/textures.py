@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.records import record
 from defshade_cli.image.texture import Source, TexelImage, load_images, resized
-from defshade_cli.scene.material import TEXTURED_FIELDS, UV_SETS, Material
+from defshade_cli.scene.material import TEXTURED_FIELDS, Material
 from defshade_cli.scene.texture import FIRST_UDIM, Texture, TextureInput, Wrap
 
 _ANISOTROPY = 8.0
@@ -150,24 +150,21 @@ def _wraps(texture: Texture, image: TexelImage) -> tuple[int, int]:
     )
 
 
-def input_records(materials: Sequence[Material], found: TextureSet) -> tuple[NDArray, list[int]]:
-    """TextureInput records, material by material, and how many each has."""
+def input_records(
+    materials: Sequence[Material], found: TextureSet, slots: Mapping[str, int]
+) -> tuple[NDArray, list[int]]:
+    """TextureInput records, material by material, and how many each has.  slots: see gpu.vertices.uv_slots."""
     usable = [
-        [(name, i) for name, i in m.inputs.items() if i.texture in found.places and uv_set(m, i) < UV_SETS]
+        [(name, i) for name, i in m.inputs.items() if i.texture in found.places and (i.uv in slots or not i.uv)]
         for m in materials
     ]
     records = np.zeros(sum(map(len, usable)), record("TextureInput"))
     row = 0
-    for material, inputs in zip(materials, usable, strict=True):
+    for inputs in usable:
         for name, texture_input in inputs:
-            _fill(records[row], name, texture_input, uv_set(material, texture_input), found)
+            _fill(records[row], name, texture_input, slots.get(texture_input.uv, 0), found)
             row += 1
     return records, [len(inputs) for inputs in usable]
-
-
-def uv_set(material: Material, texture_input: TextureInput) -> int:
-    """Which of the material's sets of texture coordinates an input reads; any will do where it reads none."""
-    return material.uv_names.index(texture_input.uv) if texture_input.uv else 0
 
 
 def _fill(row: NDArray, name: str, texture_input: TextureInput, uv: int, found: TextureSet) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import logging
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,17 +12,40 @@ from defshade_cli.gpu.planes import MOST_PRIMVARS
 from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.material import UV_SETS, Material
 
+log = logging.getLogger("defshade")
+
 UvNames = tuple[str, ...]
 
 
 def uv_names(drawables: Sequence[Drawable], materials: Sequence[Material], count: int) -> tuple[UvNames, ...]:
-    """For each of `count` meshes the primvars that fill its sets, as the first of its materials wants them."""
-    names: list[UvNames] = [()] * count
+    """For each of `count` meshes the primvars that its materials read, each once."""
+    names: list[dict[str, None]] = [{} for _ in range(count)]
     for drawable in drawables:
         for subset in drawable.subsets:
-            wanted = materials[subset.material].uv_names[:UV_SETS]
-            names[drawable.mesh] += wanted[len(names[drawable.mesh]) :]
-    return tuple(names)
+            names[drawable.mesh].update(dict.fromkeys(materials[subset.material].uv_names[:UV_SETS]))
+    return tuple(tuple(found) for found in names)
+
+
+def uv_slots(names: Sequence[UvNames]) -> dict[str, int]:
+    """Which set each primvar fills, the same on all meshes: another one than those that share a mesh with it.
+
+    One for which no set is left is missing; what reads it keeps its constant.
+    """
+    slots: dict[str, int] = {}
+    for name in dict.fromkeys(name for found in names for name in found):
+        beside = {other for found in names if name in found for other in found}
+        free = set(range(UV_SETS)) - {slots[other] for other in beside if other in slots}
+        if free:
+            slots[name] = min(free)
+        else:
+            log.warning("texture coordinates %s are not read: a mesh holds %d sets", name, UV_SETS)
+    return slots
+
+
+def in_slots(names: UvNames, slots: Mapping[str, int]) -> UvNames:
+    """What fills each set of a mesh; empty for nothing."""
+    filled = {slots[name]: name for name in names if name in slots}
+    return tuple(filled.get(slot, "") for slot in range(UV_SETS))
 
 
 def vertex_arrays(

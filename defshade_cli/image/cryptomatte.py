@@ -83,7 +83,12 @@ class Coverage:
 
     def add(self, numbers: NDArray[np.int32]) -> None:
         """One sample: (P,) numbers, negative where nothing is seen."""
-        left = np.flatnonzero(numbers >= 0)
+        seen = numbers >= 0
+        if self._slots:  # most pixels show what they showed first
+            again = seen & (self._slots[0].number == numbers)
+            self._slots[0].count[...] += again
+            seen &= ~again
+        left = np.flatnonzero(seen)
         for slot in self._slots:
             left = _put(slot, left, numbers)
         while len(left) and len(self._slots) < self._most:

@@ -77,7 +77,7 @@ class EnvironmentPass:
         """Add a dome to the targets. first_link: place of its bits, which are bound."""
         dome = planned.light
         assert isinstance(dome, DomeLight)
-        targets.framebuffers[planned.groups].use()
+        targets.of(planned.groups).use()
         self._gpu.context.enable_only(moderngl.BLEND)
         self._gpu.context.blend_func = moderngl.ONE, moderngl.ONE
         sky = sky_of(dome)

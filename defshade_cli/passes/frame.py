@@ -6,7 +6,7 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import Plane
 from defshade_cli.gpu.targets import Target, allocate
 from defshade_cli.passes.gbuffer import GBuffer, make_gbuffer
-from defshade_cli.passes.light_targets import LightTargets, make_light_targets
+from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.plan import Plan
 from defshade_cli.settings import Layout
 
@@ -41,12 +41,12 @@ class Frame:
 
     def light_targets(self, radiance: Target, plan: Plan) -> LightTargets:
         """For the plan's lights, behind the radiance of a sample; those of another kind of plan are freed."""
-        kind = radiance, plan.outputs, plan.groups, frozenset(planned.groups for planned in plan.lights)
+        kind = radiance, plan.outputs, plan.groups
         known, targets = self._lights
         if targets is None or known != kind:
             if targets:
                 targets.release()
-            targets = make_light_targets(self._gpu, radiance, plan)
+            targets = LightTargets(self._gpu, radiance, plan)
             self._lights = kind, targets
         return targets
 

@@ -14,6 +14,7 @@ from defshade_cli.gpu.targets import Target, allocate
 from defshade_cli.gpu.textures import textures_source
 from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.screen import TileMask
+from defshade_cli.scene.camera import Camera
 from defshade_cli.settings import Layout
 
 
@@ -41,11 +42,16 @@ def make_gbuffer(gpu: Gpu, size: tuple[int, int], planes: tuple[Plane, ...], lay
     return GBuffer(allocate(gpu, size, formats, gpu.depth_texture(size)), planes, layout)
 
 
+_CLIP_DISTANCE0 = 0x3000
+"""GL_CLIP_DISTANCE0, which moderngl has no name for."""
+
+
 @dataclass(frozen=True, slots=True)
 class GBufferVariant:
     """What the pass is compiled for.
 
     cutout: some opacity is below 1; color_varies: displayColor a vertex; texture_groups: 0 without textures.
+    clipping_planes: how many the camera has.
     """
 
     planes: tuple[Plane, ...]
@@ -54,11 +60,13 @@ class GBufferVariant:
     color_varies: bool
     texture_groups: int = 0
     space: RenderSpace = REC709
+    clipping_planes: int = 0
 
     @property
     def defines(self) -> list[str]:
         flags = ["CUTOUT"] * self.cutout + ["DISPLAY_COLOR_VARIES"] * self.color_varies
         flags += ["TEXTURES", "POSITION"] * bool(self.texture_groups)
+        flags += [f"CLIPPING_PLANES {self.clipping_planes}"] * bool(self.clipping_planes)
         inputs = [name for plane in self.planes for name in plane.inputs]
         return list(dict.fromkeys([plane.define for plane in self.planes] + flags + inputs)) + space_defines(self.space)
 
@@ -72,12 +80,13 @@ class GBufferPass:
             "generated/textures.glsl": textures_source(variant.texture_groups),
         }
         self._gpu, self._context = gpu, gpu.context
+        self._clip_distances = range(_CLIP_DISTANCE0, _CLIP_DISTANCE0 + variant.clipping_planes)
         self._program = gpu.shaders.program(
             "gbuffer.vert", "gbuffer.frag", defines=variant.defines, generated=generated
         )
 
-    def draw(self, draws: DrawList, gbuffer: GBuffer, mask: TileMask, *, whole: bool = False) -> None:
-        """All of `draws` with the bound View, one multi-draw; both sides of every face.
+    def draw(self, draws: DrawList, gbuffer: GBuffer, mask: TileMask, camera: Camera, *, whole: bool = False) -> None:
+        """All of `draws` with the bound View, that of `camera`, one multi-draw; both sides of every face.
 
         Under the mask the depth is the background's afterwards, and the planes are undefined unless `whole`.
         """
@@ -94,7 +103,19 @@ class GBufferPass:
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = "<" if standard else ">"
         draws.textures.bind(self._program)
+        self._clip(camera)
         vertex_array = self._context.vertex_array(self._program, draws.vertices_of(self._program), draws.indices)
         vertex_array.render_indirect(draws.commands)
         vertex_array.release()
+        for distance in self._clip_distances:
+            self._context.disable_direct(distance)
         mask.fill(gbuffer.target, background)
+
+    def _clip(self, camera: Camera) -> None:
+        """By the camera's clipping planes, in relative space. Shadows are cast by what they cut off, as in Storm."""
+        for distance in self._clip_distances:
+            self._context.enable_direct(distance)
+        if self._clip_distances:
+            planes = camera.clipping_planes.copy()
+            planes[:, :3] @= camera.world_from_camera[:3, :3].T
+            self._program["clipping_planes"] = [tuple(plane) for plane in planes.tolist()]

@@ -45,14 +45,23 @@ def id_manifests(layers: Mapping[str, NDArray[np.float32]], scene: Scene) -> Man
 
 
 class Mattes:
-    """The Cryptomattes of a plan, gathered sample by sample."""
+    """The Cryptomattes of a plan, gathered sample by sample; names are numbered as they are met."""
 
     def __init__(self, scene: Scene, plan: Plan) -> None:
-        identities = Identities(scene)
         self._plan = plan
-        self._names = {layer: _matte_names(layer, identities) for layer in plan.mattes}
-        self._tables = {layer: _matte_table(layer, identities) for layer in plan.mattes}
+        self._numbers: dict[str, dict[str, int]] = {layer: {} for layer in plan.mattes}
         self._coverage = {layer: Coverage(_SLOTS_PER_RANK * plan.ranks) for layer in plan.mattes}
+        self.see(scene)
+
+    def see(self, scene: Scene) -> None:
+        """The samples to come are of this scene: the same, maybe at another moment."""
+        identities = Identities(scene)
+        self._tables = {layer: self._table(layer, identities) for layer in self._coverage}
+
+    def _table(self, layer: str, identities: Identities) -> Table:
+        known = self._numbers[layer]
+        numbers = [known.setdefault(name, len(known)) for name in _matte_names(layer, identities)]
+        return np.array([*numbers, -1], np.int32)[_matte_table(layer, identities)]
 
     def add(self, visible: NDArray[np.uint32]) -> None:
         """One sample's plane (H, W, 2)."""
@@ -63,9 +72,9 @@ class Mattes:
         """(H, W, 2 · ranks) each, of so many samples."""
         width, height = self._plan.size
         return {
-            layer: coverage.ranked(name_ids(self._names[layer]), self._plan.ranks, samples, width * height).reshape(
-                height, width, -1
-            )
+            layer: coverage.ranked(
+                name_ids([*self._numbers[layer]]), self._plan.ranks, samples, width * height
+            ).reshape(height, width, -1)
             for layer, coverage in self._coverage.items()
         }
 
@@ -74,7 +83,8 @@ class Mattes:
         return {layer: self._manifest(layer) for layer in self._coverage}
 
     def _manifest(self, layer: str) -> dict[int, str]:
-        names = [self._names[layer][number] for number in self._coverage[layer].seen()]
+        every = [*self._numbers[layer]]
+        names = [every[number] for number in self._coverage[layer].seen()]
         return dict(zip(name_ids(names).tolist(), names, strict=True))
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +13,28 @@ from defshade_cli.plan import Plan
 Groups = tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class LightTargets:
     """radiance: of one sample.  sums: layer → what it has over all samples, blended straight into.
 
-    framebuffers: for the lights of each set of groups, the radiance, the outputs that every light has, and the groups.
+    Raises GpuError.
     """
 
-    radiance: Target
-    sums: Mapping[str, Target]
-    framebuffers: Mapping[Groups, moderngl.Framebuffer]
+    def __init__(self, gpu: Gpu, radiance: Target, plan: Plan) -> None:
+        self.radiance = radiance
+        self.sums = {name: allocate(gpu, plan.size, {"sum": (4, "f4")}) for name in (*plan.outputs, *plan.groups)}
+        self._context, self._outputs = gpu.context, plan.outputs
+        self._framebuffers: dict[Groups, moderngl.Framebuffer] = {}
+
+    def of(self, groups: Groups) -> moderngl.Framebuffer:
+        """For lights of a set of groups: the radiance, the outputs that every light has, and the groups."""
+        names = (*self._outputs, *groups)
+        if not names:
+            return self.radiance.framebuffer
+        if names not in self._framebuffers:
+            textures = [self.radiance.textures["radiance"], *(self.sums[name].textures["sum"] for name in names)]
+            self._framebuffers[names] = self._context.framebuffer(textures, self.radiance.depth)
+            self._framebuffers[names].depth_mask = False
+        return self._framebuffers[names]
 
     def clear(self) -> None:
         for target in self.sums.values():
@@ -35,33 +44,12 @@ class LightTargets:
         """All but the radiance, which has its own maker."""
         for target in self.sums.values():
             target.release()
-        for groups in self.framebuffers:
-            if self.framebuffers[groups] is not self.radiance.framebuffer:
-                self.framebuffers[groups].release()
+        for framebuffer in self._framebuffers.values():
+            framebuffer.release()
 
     def layers(self, counts: NDArray[np.int32]) -> dict[str, NDArray[np.float32]]:
         """(H, W, C) of each layer that is a sum. counts: (H, W, 1) samples that each pixel got."""
         return {name: _layer(name, target.read("sum"), counts.astype(np.float32)) for name, target in self.sums.items()}
-
-
-def make_light_targets(gpu: Gpu, radiance: Target, plan: Plan) -> LightTargets:
-    """Targets for a plan's lights. Raises GpuError."""
-    names = (*plan.outputs, *plan.groups)
-    sums = {name: allocate(gpu, plan.size, {"sum": (4, "f4")}) for name in names}
-    together = {planned.groups for planned in plan.lights} | {()}
-    framebuffers = {
-        groups: _framebuffer(gpu, radiance, [sums[n] for n in (*plan.outputs, *groups)]) for groups in together
-    }
-    return LightTargets(radiance, sums, framebuffers)
-
-
-def _framebuffer(gpu: Gpu, radiance: Target, sums: list[Target]) -> moderngl.Framebuffer:
-    if not sums:
-        return radiance.framebuffer
-    textures = [radiance.textures["radiance"], *(target.textures["sum"] for target in sums)]
-    framebuffer = gpu.context.framebuffer(textures, radiance.depth)
-    framebuffer.depth_mask = False
-    return framebuffer
 
 
 def _layer(name: str, total: NDArray[np.float32], counts: NDArray[np.float32]) -> NDArray[np.float32]:

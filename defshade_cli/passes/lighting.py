@@ -135,7 +135,7 @@ class LightingPass:
         self._context.depth_func = ">" if uses_standard_depth(gbuffer.layout) else "<"
         alike = [(planned.volume, planned.groups) for planned in lights]
         for volume, groups in dict.fromkeys(alike):
-            targets.framebuffers[groups].use()
+            targets.of(groups).use()
             maps = shadows.depth if shadows else None
             gbuffer.bind(self._volumes[volume].program, shadow_atlas=maps, ies_tables=tables.candela)
             draw = self._draw_quads if volume == "quad" else self._draw_volumes

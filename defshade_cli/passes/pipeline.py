@@ -118,6 +118,7 @@ class Pipeline:
             if moments and plan.moments and sample.index % plan.samples_a_moment == 0:
                 scene, plan = next(moments)
                 draws, tables = self._scene.update(scene, plan.inputs), self._tables.update(plan)
+                mattes.see(scene)
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             if plan.mattes:
                 mattes.add(gbuffer.target.read("visible"))
@@ -181,6 +182,12 @@ class Pipeline:
     def _draw_gbuffer(self, draws: DrawList, plan: Plan, gbuffer: GBuffer, sample: Sample) -> None:
         self._view.write(view_record(plan, gbuffer.layout, sample))
         variant = GBufferVariant(
-            gbuffer.planes, gbuffer.layout, plan.cutout, draws.color_varies, draws.texture_groups, plan.render_space
+            gbuffer.planes,
+            gbuffer.layout,
+            plan.cutout,
+            draws.color_varies,
+            draws.texture_groups,
+            plan.render_space,
+            len(plan.camera.clipping_planes),
         )
-        self._gbuffer_pass(variant).draw(draws, gbuffer, self._mask, whole=bool(plan.mattes))
+        self._gbuffer_pass(variant).draw(draws, gbuffer, self._mask, plan.camera, whole=bool(plan.mattes))

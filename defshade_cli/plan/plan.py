@@ -228,16 +228,10 @@ ShutterSample = tuple[Scene, Plan]
 """What is there while the shutter is open, at one time."""
 
 
-def plan_moments(scene: Scene, plan: Plan, seen: Iterator[Scene], settings: RenderSettings) -> Iterator[ShutterSample]:
-    """What the samples see in turn: `seen` with plans that fill the same planes.
-
-    Where a matte is asked for, which counts what the frame draws, a moment that draws something else shows the frame.
-    """
+def plan_moments(plan: Plan, seen: Iterator[Scene], settings: RenderSettings) -> Iterator[ShutterSample]:
+    """What the samples see in turn: `seen` with plans that fill the same planes."""
     for moment in seen:
-        if plan.mattes and not moment.draws_like(scene):
-            yield scene, plan
-        else:
-            yield moment, replace(make_plan(moment, settings), planes=plan.planes)
+        yield moment, replace(make_plan(moment, settings), planes=plan.planes)
 
 
 def _seen_lights(lights: tuple[PlannedLight, ...], layers: tuple[str, ...]) -> tuple[PlannedLight, ...]:

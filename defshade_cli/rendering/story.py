@@ -146,7 +146,7 @@ def _draw(shot: Shot, opened: OpenJob, renderer: Renderer, command: str) -> _Dra
     with _timed(seconds, "context"):
         pipeline = renderer.pipeline(job.device)
     with _timed(seconds, "draw"):
-        moments = plan_moments(scene, plan, reader.read_shutter(scene, plan.moments), job.settings)
+        moments = plan_moments(plan, reader.read_shutter(scene, plan.moments), job.settings)
         film = pipeline.render(scene, plan, moments)
     facts = _provenance(shot, command) | film.metadata | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of}
     return _Drawn(shot, replace(film, metadata=facts), plan, seconds)

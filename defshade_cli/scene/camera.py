@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -48,6 +48,7 @@ class Camera:
     exposure: linear scale of the camera's exposure attributes (UsdGeomCamera.ComputeLinearExposureScale).
     f_stop, focus_distance, focal_length: lens; f_stop 0 is a pinhole.
     shutter: (open, close) in time codes around the frame.
+    clipping_planes: (N, 4) float64 in camera space: a point p is seen where no plane · (p, 1) is negative.
     """
 
     path: str
@@ -60,9 +61,11 @@ class Camera:
     focus_distance: float = 0.0
     focal_length: float = 0.0
     shutter: tuple[float, float] = (0.0, 0.0)
+    clipping_planes: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4)))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "world_from_camera", frozen(self.world_from_camera, np.float64, 4, 4))
+        object.__setattr__(self, "clipping_planes", frozen(self.clipping_planes, np.float64, -1, 4))
 
     def shutter_times(self, count: int) -> tuple[float, ...]:
         """The middles of `count` equal parts of the shutter, in time codes around the frame.

@@ -65,14 +65,6 @@ class Scene:
     data_window: tuple[float, float, float, float] = WHOLE_IMAGE
     rendering_space: str | None = None
 
-    def draws_like(self, other: Scene) -> bool:
-        """Are the same prims drawn as often with the same materials, wherever they are?"""
-        return self._drawn == other._drawn
-
-    @cached_property
-    def _drawn(self) -> list[tuple]:
-        return [(d.paths, len(d.world_from_object), d.subsets) for d in self.drawables]
-
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
         """(2, 3) world-space box around every drawable; (+inf, −inf) for a scene without geometry."""

@@ -39,7 +39,26 @@ class Bindings(NamedTuple):
 NOTHING_BOUND = Bindings()
 
 
-def read_bindings(prim: Usd.Prim) -> Bindings:
+class Bound(NamedTuple):
+    """The bindings that USD resolves for a prim. by_collection: some on it or above it bind what a collection holds."""
+
+    bindings: Bindings
+    by_collection: bool
+
+
+NOTHING_ABOVE = Bound(NOTHING_BOUND, by_collection=False)
+
+
+def read_bound(prim: Usd.Prim, above: Bound) -> Bound:
+    """Of `prim`, whose parent has `above`: the same, unless it has bindings of its own or a collection may hold it."""
+    own = prim.GetAuthoredPropertiesInNamespace("material")
+    if not own and not above.by_collection:
+        return above
+    by_collection = above.by_collection or any(":collection:" in each.GetName() for each in own)
+    return Bound(_resolve(prim), by_collection)
+
+
+def _resolve(prim: Usd.Prim) -> Bindings:
     """What is bound to `prim`, a gprim, a subset or an instance, by its own stage hierarchy."""
     api = UsdShade.MaterialBindingAPI(prim)
     _, everywhere = api.ComputeBoundMaterial()

@@ -24,6 +24,9 @@ log = logging.getLogger("defshade")
 FRAMED = "<framed>"
 """Path of the camera that frames the geometry."""
 
+MOST_CLIPPING_PLANES = 8
+"""What OpenGL asks of every driver."""
+
 _Z_UP_FROM_FRONT = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], np.float64)
 _USABLE_CLIPPING = (1.0, 1.0e6)  # UsdGeomCamera's fallback
 _NEAREST = 1e-6  # near plane over far plane, where the authored one is not in front of the camera
@@ -61,6 +64,7 @@ def read_camera(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Camera, tuple[Unsup
     schema, path = UsdGeom.Camera(prim), str(prim.GetPath())
     gf = schema.GetCamera(time)
     is_perspective = gf.projection == Gf.Camera.Perspective
+    planes, issues = _clipping_planes(gf, path)
     camera = Camera(
         path=path,
         world_from_camera=rigid(matrix(gf.transform)),
@@ -72,8 +76,8 @@ def read_camera(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Camera, tuple[Unsup
         focus_distance=gf.focusDistance,
         focal_length=gf.focalLength * Gf.Camera.FOCAL_LENGTH_UNIT,
         shutter=(schema.GetShutterOpenAttr().Get(time), schema.GetShutterCloseAttr().Get(time)),
+        clipping_planes=planes,
     )
-    issues = (Unsupported(path, "clippingPlanes are ignored"),) if gf.clippingPlanes else ()
     return camera, issues
 
 
@@ -112,6 +116,16 @@ def _window(gf: Gf.Camera, path: str) -> tuple[float, float, float, float]:
     if not (low[0] < high[0] and low[1] < high[1]):
         raise StageError(f"camera {path} sees nothing: its aperture is {gf.horizontalAperture}x{gf.verticalAperture}")
     return low[0], high[0], low[1], high[1]
+
+
+def _clipping_planes(gf: Gf.Camera, path: str) -> tuple[NDArray[np.float64], tuple[Unsupported, ...]]:
+    """(N, 4): no more than a driver is bound to have, and all of them planes."""
+    authored = np.array(gf.clippingPlanes, np.float64).reshape(-1, 4)
+    sound = authored[np.isfinite(authored).all(axis=1) & authored[:, :3].any(axis=1)]
+    kept = sound[:MOST_CLIPPING_PLANES]
+    if len(kept) == len(authored):
+        return kept, ()
+    return kept, (Unsupported(path, f"{len(authored) - len(kept)} of its {len(authored)} clippingPlanes are left out"),)
 
 
 def _clipping_range(gf: Gf.Camera, path: str, is_perspective: bool) -> tuple[float, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import cast, get_args
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ CONTROL_ATTRIBUTES = (
 )
 """What is read of a Mesh that may vary over time, besides what its polygons need."""
 
+_PLAIN: WeakKeyDictionary[Polygons, Topology] = WeakKeyDictionary()
 _FACE_VARYING_FALLBACK: LinearInterpolation = "cornersPlus1"
 
 
@@ -37,7 +39,9 @@ class Control:
     face_varying: LinearInterpolation = _FACE_VARYING_FALLBACK
 
     def equals(self, other: Control) -> bool:
-        return self.face_varying == other.face_varying and self.topology.equals(other.topology)
+        return self.face_varying == other.face_varying and (
+            self.topology is other.topology or self.topology.equals(other.topology)
+        )
 
     def triangle_count(self, level: int) -> int:
         """Triangles at `level`, holes counted: every face becomes four, but for a first split into quads."""
@@ -51,12 +55,28 @@ def read_control(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode, iss
     """None where the polygons are the surface, and where what is authored describes none."""
     if polygons.scheme == "none" or not len(polygons.counts):
         return None
+    says_more = not set(CONTROL_ATTRIBUTES).isdisjoint(mesh.GetPrim().GetAuthoredPropertyNames())
     try:
-        topology = _read_topology(mesh, polygons, time)
+        topology = _read_topology(mesh, polygons, time) if says_more else _plain_topology(polygons)
     except ValueError as error:
         issues.append(f"drawn without subdivision: {error}")
         return None
+    if not says_more:
+        return Control(topology)
     return Control(topology, _face_varying(mesh, time, issues))
+
+
+def _plain_topology(polygons: Polygons) -> Topology:
+    """With the schema's rules, and without creases and corners; once for polygons that surfaces share."""
+    if polygons not in _PLAIN:
+        _PLAIN[polygons] = Topology(
+            face_counts=polygons.counts,
+            face_indices=polygons.indices,
+            vertex_count=len(polygons.points),
+            scheme=cast(SchemeName, polygons.scheme),
+            holes=np.flatnonzero(np.isin(polygons.faces, polygons.holes)),
+        )
+    return _PLAIN[polygons]
 
 
 def _read_topology(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode) -> Topology:

@@ -24,6 +24,8 @@ class Copies:
 
 def once(display_color: NDArray[np.float32] | None = None, display_opacity: float | None = None) -> Copies:
     """A single copy, where the prim is."""
+    if display_color is None and display_opacity is None:
+        return _ONCE
     color, opacity = (np.nan if value is None else value for value in (display_color, display_opacity))
     return Copies(
         np.eye(4)[None],
@@ -31,3 +33,8 @@ def once(display_color: NDArray[np.float32] | None = None, display_opacity: floa
         np.full((1, 3), color, np.float32),
         np.full(1, opacity, np.float32),
     )
+
+
+_ONCE = Copies(
+    np.eye(4)[None], np.full(1, -1, np.int32), np.full((1, 3), np.nan, np.float32), np.full(1, np.nan, np.float32)
+)

@@ -8,8 +8,6 @@ them, to samples.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
@@ -18,7 +16,7 @@ from defshade_cli.usd.basis import LARGEST_DETAIL, CurveSamples, Kind, sample_cu
 from defshade_cli.usd.points import read_widths
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.positions import read_positions
-from defshade_cli.usd.primvars import DISPLAY_COLOR, Authored, authored, fit, read_display, read_uvs
+from defshade_cli.usd.primvars import DISPLAY_COLOR, Authored, authored, fit, read_carried
 from defshade_cli.usd.tubes import ribbons, tubes
 from defshade_cli.usd.values import integers
 
@@ -91,12 +89,7 @@ def _build(
     authored_normals = fit(_normals(curves, time), 3, samples.elements, issues)
     normals = None if authored_normals is None else samples.at(authored_normals)
     shape = tubes(samples, centres, radii, sides) if normals is None else ribbons(samples, centres, radii, normals)
-    shape = replace(
-        shape,
-        display_color=read_display(prim, color, 3, time, samples.elements, issues),
-        display_opacity=read_display(prim, "displayOpacity", 1, time, samples.elements, issues),
-        uvs=read_uvs(prim, time, samples.elements, issues),
-    )
+    shape = read_carried(prim, time, samples.elements, issues, color).laid_on(shape)
     around = len(shape.points) // max(samples.count, 1)
     return shape.with_primvars(lambda p: p if p is shape.normals else _around(p, samples, around))
 

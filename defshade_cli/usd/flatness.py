@@ -6,6 +6,9 @@ Refinement halves e and θ alike, so that every level leaves a quarter of the di
 
 from __future__ import annotations
 
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +17,23 @@ from defshade_cli.usd.polygons import Polygons
 
 _QUANTILE = 0.98
 """Of the edges that are taken for the surface; the few sharpest would refine all others with them."""
+
+
+class Flatness(NamedTuple):
+    """mean_edge: root of the mean square of the edges' lengths.  rise: of the surface over its cage."""
+
+    mean_edge: float
+    rise: float
+
+
+_KNOWN: WeakKeyDictionary[Polygons, Flatness] = WeakKeyDictionary()
+
+
+def flatness(polygons: Polygons) -> Flatness:
+    """In object units; measured once for polygons that surfaces share."""
+    if polygons not in _KNOWN:
+        _KNOWN[polygons] = Flatness(mean_edge(polygons), rise(polygons))
+    return _KNOWN[polygons]
 
 
 def mean_edge(polygons: Polygons) -> float:

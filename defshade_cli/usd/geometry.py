@@ -7,7 +7,6 @@ Surface ── refiner ── normals ── cut ──→ Gprim      as finely 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +14,11 @@ from pxr import Usd, UsdGeom
 
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.scene.scene import Unsupported
-from defshade_cli.usd import flatness
 from defshade_cli.usd.control import CONTROL_ATTRIBUTES, Control, read_control
 from defshade_cli.usd.copies import Copies
 from defshade_cli.usd.curves import CURVES_ATTRIBUTES, read_curves
 from defshade_cli.usd.cut import Cut, cut, varies
+from defshade_cli.usd.flatness import flatness
 from defshade_cli.usd.gprims import read_solid, size_attributes
 from defshade_cli.usd.mesh import MESH_ATTRIBUTES, read_mesh
 from defshade_cli.usd.normals import with_normals
@@ -31,11 +30,12 @@ from defshade_cli.usd.primvars import (
     DISPLAY_COLOR,
     Elements,
     count_elements,
-    find_display,
-    find_uvs,
+    find_primvars,
+    may_be_uvs,
     read_shown,
 )
 from defshade_cli.usd.refiner import Refiner
+from defshade_cli.usd.shapes import Shapes
 from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.subsets import FaceGroup, Faces, material_subsets, read_faces
 
@@ -67,16 +67,16 @@ class Surface:
     display_opacity: float | None
     issues: tuple[Unsupported, ...]
 
-    @cached_property
+    @property
     def mean_edge(self) -> float:
-        return flatness.mean_edge(self.polygons)
+        return flatness(self.polygons).mean_edge
 
-    @cached_property
+    @property
     def rise(self) -> float:
-        return flatness.rise(self.polygons)
+        return flatness(self.polygons).rise
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Gprim:
     """A surface as triangles.
 
@@ -93,12 +93,17 @@ class Gprim:
 
 
 def read_surface(
-    prim: Usd.Prim, time: Usd.TimeCode, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = ()
+    prim: Usd.Prim,
+    time: Usd.TimeCode,
+    color: str = DISPLAY_COLOR,
+    shown: tuple[str, ...] = (),
+    shapes: Shapes | None = None,
 ) -> Surface | None:
     """The surface of `prim`; None for a type that is no supported surface. Bad data becomes issues, never raises.
 
     A surface of which nothing can be drawn has no groups, and issues that say why.
     color: primvar to take for displayColor.  shown: primvars for layers.
+    shapes: of other prims, whose polygons it shares where they are equal.
     """
     issues: list[str] = []
     path = str(prim.GetPath())
@@ -107,18 +112,20 @@ def read_surface(
         return None
     if shown:
         polygons = replace(polygons, shown=read_shown(prim, shown, time, _elements(polygons), issues))
+    display_color, opacity = _constant(polygons.display_color), _constant(polygons.display_opacity)
+    if shapes is not None:
+        polygons = shapes.shared(polygons.without_constants())
     control = read_control(UsdGeom.Mesh(prim), polygons, time, issues) if prim.IsA(UsdGeom.Mesh) else None
     faces = read_faces(prim, time, issues)
-    opacity = _constant(polygons.display_opacity)
     return Surface(
         path=path,
         polygons=polygons,
         control=control,
         faces=faces,
         groups=faces.groups_of(polygons.without_holes().faces) if copies is None or len(copies.ids) else (),
-        double_sided=bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get()),
+        double_sided=prim.HasProperty("doubleSided") and bool(prim.GetAttribute("doubleSided").Get()),
         copies=copies,
-        display_color=_constant(polygons.display_color),
+        display_color=display_color,
         display_opacity=None if opacity is None else float(opacity),
         issues=tuple(Unsupported(path, issue) for issue in issues),
     )
@@ -164,9 +171,7 @@ def varying_names(prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, 
     primvars = (
         UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals"),
         UsdGeom.PrimvarsAPI(prim).GetPrimvar("widths"),
-        find_display(prim, color),
-        find_display(prim, "displayOpacity"),
-        *find_uvs(prim),
+        *_carried(prim, color),
         *(UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name) for name in shown),
     )
     subsets = (subset.GetIndicesAttr() for subset in material_subsets(prim))
@@ -174,6 +179,12 @@ def varying_names(prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, 
     names = {str(source.GetName()) for source in sources if source and source.ValueMightBeTimeVarying()}
     carried = prim.IsA(UsdGeom.PointBased) and is_carried_by_velocities(prim, Usd.TimeCode(0.0))
     return names | {"velocities"} if carried else names
+
+
+def _carried(prim: Usd.Prim, color: str) -> list[UsdGeom.Primvar]:
+    """The primvars that may be read of it, see primvars.read_carried."""
+    found = find_primvars(prim).items()
+    return [p for name, p in found if name in (color, "displayOpacity") or may_be_uvs(p)]
 
 
 def _read_shape(

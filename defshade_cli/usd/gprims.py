@@ -9,18 +9,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd
 
 from defshade_cli.usd.polygons import Polygons
-from defshade_cli.usd.primvars import DISPLAY_COLOR, Elements, count_elements, read_display, read_uvs
+from defshade_cli.usd.primvars import DISPLAY_COLOR, Elements, count_elements, read_carried
 from defshade_cli.usd.revolution import SEGMENTS, Strip, arc, disk, revolve, side
 from defshade_cli.usd.values import floats
 
 _SPINE = {"X": 1, "Y": 2, "Z": 0}
 """Cyclic steps that take the spine from z to the axis; a cyclic permutation keeps the winding."""
+
+_MOST_KEPT = 256
+"""Solids that are remembered."""
 
 _LARGEST_SIZE = 1e37
 """Beyond it points would leave the range of float32."""
@@ -100,14 +104,15 @@ def read_solid(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str], color: str
     if build is plane and axis != "Z":
         names = names[::-1]  # length comes first in cyclic order, by the schema's table of axes
     sizes = [_size(prim, name, time, issues) for name in names]
-    polygons = _quads(np.empty((0, 3)), np.empty((0, 4), int)) if None in sizes else build(*sizes)
-    elements = _elements(polygons)
-    return replace(
-        _along(polygons, _SPINE[axis]),
-        display_color=read_display(prim, color, 3, time, elements, issues),
-        display_opacity=read_display(prim, "displayOpacity", 1, time, elements, issues),
-        uvs=read_uvs(prim, time, elements, issues),
-    )
+    polygons = _built(build, axis, tuple(sizes))
+    return read_carried(prim, time, _elements(polygons), issues, color).laid_on(polygons)
+
+
+@lru_cache(maxsize=_MOST_KEPT)
+def _built(build: Callable[..., Polygons], axis: str, sizes: tuple[float | None, ...]) -> Polygons:
+    """The same object for the same solid: a stage may hold thousands."""
+    solid = _quads(np.empty((0, 3)), np.empty((0, 4), int)) if None in sizes else build(*sizes)
+    return _along(solid, _SPINE[axis])
 
 
 def _elements(polygons: Polygons) -> Elements:

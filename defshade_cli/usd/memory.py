@@ -8,11 +8,12 @@ from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.usd import draw_mode
-from defshade_cli.usd.binding import Bindings, read_bindings
+from defshade_cli.usd.binding import NOTHING_ABOVE, Bindings, Bound, read_bound
 from defshade_cli.usd.geometry import Surface, is_time_varying, move_surface, only_points_vary, read_surface
 from defshade_cli.usd.kind import Kinds
 from defshade_cli.usd.material import ReadMaterial, read_material
 from defshade_cli.usd.primvars import DISPLAY_COLOR
+from defshade_cli.usd.shapes import Shapes
 from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.skel import Rigs
 from defshade_cli.usd.subsets import material_subsets
@@ -30,9 +31,10 @@ class Memory:
         self.rigs = Rigs()
         self.xforms = UsdGeom.XformCache()
         self._stage, self._extras = stage, extras
+        self._shapes = Shapes()
         self._surfaces: dict[Sdf.Path, tuple[Usd.TimeCode, Surface | None]] = {}
         self._time_varying: dict[Sdf.Path, bool] = {}
-        self._bindings: dict[Sdf.Path, Bindings] = {}
+        self._bindings: dict[Sdf.Path, Bound] = {}
         self._materials: dict[Sdf.Path, ReadMaterial] = {}
         self._first_instances: dict[str, str] = {}
         self._models = draw_mode.StandIns()
@@ -55,7 +57,8 @@ class Memory:
         return shared(moved or self._read_surface(prim, time), known)
 
     def _read_surface(self, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
-        surface = read_surface(prim, time, self._color_primvar(prim, time), self._extras.primvars)
+        color = self._color_primvar(prim, time)
+        surface = read_surface(prim, time, color, self._extras.primvars, self._shapes)
         return None if surface is None else self._as_shown(surface, prim.GetPath())
 
     def stand_in(self, prim: Usd.Prim, mode: str) -> Surface:
@@ -85,10 +88,18 @@ class Memory:
 
     def bindings(self, path: Sdf.Path | str) -> Bindings:
         """Relationships do not vary over time."""
-        path = Sdf.Path(path)
-        if path not in self._bindings:
-            self._bindings[path] = read_bindings(self._stage.GetPrimAtPath(path))
-        return self._bindings[path]
+        return self._bound(self._stage.GetPrimAtPath(path)).bindings
+
+    def _bound(self, prim: Usd.Prim) -> Bound:
+        """From the nearest prim above whose bindings are known, downwards."""
+        unknown = []
+        while prim and (path := prim.GetPath()) not in self._bindings:
+            unknown.append((path, prim))
+            prim = prim.GetParent()
+        bound = self._bindings[prim.GetPath()] if prim else NOTHING_ABOVE
+        for path, below in reversed(unknown):
+            self._bindings[path] = bound = read_bound(below, bound)
+        return bound
 
     def shown(self, path: Sdf.Path | str) -> str:
         """The path by which users know a prim: for one inside a native prototype, its path in the first instance."""

@@ -16,8 +16,7 @@ from defshade_cli.usd.primvars import (
     authored,
     count_elements,
     fit,
-    read_display,
-    read_uvs,
+    read_carried,
 )
 from defshade_cli.usd.values import integers
 
@@ -29,23 +28,23 @@ _NONE = np.empty(0, np.int32)
 
 def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR) -> Polygons:
     """The mesh as authored, before refinement: faces that cannot be drawn are left out, holes stay."""
+    said = set(mesh.GetPrim().GetAuthoredPropertyNames())
     points = _points(mesh, time, issues)
     counts, indices = _topology(mesh, time, issues) if len(points) else (_NONE, _NONE)
     elements = count_elements(len(counts), len(points), len(indices))
-    scheme = _scheme(mesh, issues)
+    scheme = _scheme(mesh, issues) if "subdivisionScheme" in said else "catmullClark"
+    has_normals = scheme == "none" and not said.isdisjoint(("normals", "primvars:normals"))
     polygons = Polygons(
         points=points,
         counts=counts,
         indices=indices,
         faces=np.arange(len(counts), dtype=np.int32),
-        holes=_holes(mesh, time, len(counts), issues),
+        holes=_holes(mesh, time, len(counts), issues) if "holeIndices" in said else _NONE,
         scheme=scheme,
-        left_handed=mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded,
-        normals=_normals(mesh, time, elements, issues) if scheme == "none" else None,
-        display_color=read_display(mesh.GetPrim(), color, 3, time, elements, issues),
-        display_opacity=read_display(mesh.GetPrim(), "displayOpacity", 1, time, elements, issues),
-        uvs=read_uvs(mesh.GetPrim(), time, elements, issues),
+        left_handed="orientation" in said and mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded,
+        normals=_normals(mesh, time, elements, issues) if has_normals else None,
     )
+    polygons = read_carried(mesh.GetPrim(), time, elements, issues, color).laid_on(polygons)
     return mend_normals(_without_broken_faces(polygons, issues), issues)
 
 
@@ -69,6 +68,8 @@ def _topology(
     if counts is None or indices is None or not len(counts) or not len(indices):
         issues.append("it has no faces")
         return _NONE, _NONE
+    if counts.min() >= 0 and counts.sum(dtype=np.int64) == len(indices):
+        return counts, indices
     counts = np.maximum(counts, 0)
     ends = np.cumsum(counts, dtype=np.int64)
     complete = int(np.searchsorted(ends, len(indices), "right"))
@@ -112,8 +113,17 @@ def _normals(mesh: UsdGeom.Mesh, time: Usd.TimeCode, elements: Elements, issues:
     return None
 
 
+def _is_whole(polygons: Polygons) -> bool:
+    points, counts, indices = polygons.points, polygons.counts, polygons.indices
+    if not len(counts) or counts.min() < 3:
+        return False
+    return bool(indices.min() >= 0 and indices.max() < len(points) and np.isfinite(points).all())
+
+
 def _without_broken_faces(polygons: Polygons, issues: list[str]) -> Polygons:
     """The faces of three corners and more, all of them at points that exist and are finite."""
+    if _is_whole(polygons):
+        return polygons
     missing = (polygons.indices < 0) | (polygons.indices >= len(polygons.points))
     adrift = np.zeros_like(missing)
     lost = np.logical_not(np.isfinite(polygons.points).all(axis=1))

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.spaces import cross
 from defshade_cli.usd.polygons import Polygons, Primvar
 
 _NO_SHAPE = (0.0, 0.0, 1.0)
@@ -19,7 +20,7 @@ _OPPOSED = -1e-3
 def vector_areas(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """(B, 3) normals of faces (B, n, 3), as long as twice the area; concave and bent faces too (Newell)."""
     spokes = corners[:, 1:] - corners[:, :1]
-    return np.cross(spokes[:, :-1], spokes[:, 1:]).sum(axis=1)
+    return cross(spokes[:, :-1], spokes[:, 1:]).sum(axis=1)
 
 
 def with_normals(polygons: Polygons) -> Polygons:
@@ -83,7 +84,7 @@ def _corner_angles(polygons: Polygons) -> NDArray[np.float64]:
         points = polygons.points[polygons.indices[corners]].astype(np.float64)
         ahead = np.roll(points, -1, axis=1) - points
         behind = np.roll(points, 1, axis=1) - points
-        across = np.linalg.norm(np.cross(ahead, behind), axis=-1)
+        across = np.linalg.norm(cross(ahead, behind), axis=-1)
         angles[corners] = np.arctan2(across, np.einsum("bni,bni->bn", ahead, behind))
     return angles
 

@@ -15,7 +15,7 @@ from scipy.interpolate import BSpline
 
 from defshade_cli.usd.normals import mend_normals
 from defshade_cli.usd.polygons import Polygons, Primvar
-from defshade_cli.usd.primvars import DISPLAY_COLOR, Elements, read_display, read_uvs
+from defshade_cli.usd.primvars import DISPLAY_COLOR, read_carried
 from defshade_cli.usd.values import floats
 
 PATCH_ATTRIBUTES = (
@@ -66,7 +66,7 @@ def read_patch(
     surface = replace(
         _grid(points, -normals if left_handed else normals),
         left_handed=left_handed,
-        **_lying(prim, time, elements, issues, color),
+        **read_carried(prim, time, elements, issues, color)._asdict(),
     )
     return mend_normals(surface.with_primvars(lambda p: p if p is surface.normals else _sampled(p, u, v)), [])
 
@@ -127,14 +127,6 @@ def _grid(points: Array, normals: Array) -> Polygons:
         faces=np.zeros(len(corners), np.int32),
         normals=Primvar(normals.reshape(-1, 3).astype(np.float32), "vertex"),
     )
-
-
-def _lying(prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: list[str], color: str) -> dict:
-    return {
-        "display_color": read_display(prim, color, 3, time, elements, issues),
-        "display_opacity": read_display(prim, "displayOpacity", 1, time, elements, issues),
-        "uvs": read_uvs(prim, time, elements, issues),
-    }
 
 
 def _sampled(primvar: Primvar, u: _Direction, v: _Direction) -> Primvar:

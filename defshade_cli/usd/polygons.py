@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from hashlib import blake2b
 from typing import Literal
 
 import numpy as np
@@ -94,6 +95,12 @@ class Polygons:
 
     def by_size(self) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         """Blocks of B faces that all have n corners: the faces (B,), and their corners (B, n)."""
+        if not len(self.counts):
+            return
+        smallest, largest = int(self.counts.min()), int(self.counts.max())
+        if smallest == largest:
+            yield from self._blocks(largest)
+            return
         starts = np.cumsum(self.counts, dtype=np.intp) - self.counts
         for size in np.flatnonzero(np.bincount(self.counts)):
             block = max(1, _CORNERS_AT_ONCE // int(size))
@@ -101,6 +108,14 @@ class Polygons:
             for first in range(0, len(sized), block):
                 faces = sized[first : first + block]
                 yield faces, starts[faces, None] + np.arange(size)
+
+    def _blocks(self, size: int) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """The same where all faces have `size` corners."""
+        corners = np.arange(len(self.indices)).reshape(-1, size)
+        block = max(1, _CORNERS_AT_ONCE // size)
+        for first in range(0, len(corners), block):
+            part = corners[first : first + block]
+            yield np.arange(first, first + len(part)), part
 
     def any_corner(self, corners: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(F,) the faces with a corner for which `corners` (C,) holds."""
@@ -136,11 +151,41 @@ class Polygons:
             shown={name: change(primvar) for name, primvar in self.shown.items()},
         )
 
+    def without_constants(self) -> Polygons:
+        """Without the colour and the opacity that all of it has; a surface knows those."""
+        color = _unless_constant(self.display_color)
+        opacity = _unless_constant(self.display_opacity)
+        if color is self.display_color and opacity is self.display_opacity:
+            return self
+        return replace(self, display_color=color, display_opacity=opacity)
+
+    @cached_property
+    def digest(self) -> bytes:
+        """Equal for polygons that are equal in everything."""
+        found = blake2b(
+            repr((self.scheme, self.left_handed, tuple(self.uvs), tuple(self.shown))).encode(), digest_size=16
+        )
+        for array in (self.points, self.counts, self.indices, self.faces, self.holes):
+            _add(found, array)
+        for primvar in (
+            self.normals,
+            self.display_color,
+            self.display_opacity,
+            *self.uvs.values(),
+            *self.shown.values(),
+        ):
+            found.update(b"none" if primvar is None else primvar.interpolation.encode())
+            if primvar is not None:
+                _add(found, primvar.values)
+        return found.digest()
+
     def without_holes(self) -> Polygons:
         return self.select(~np.isin(self.faces, self.holes)) if len(self.holes) else self
 
     def joined(self) -> Polygons:
         """The same with every primvar joined."""
+        if all(primvar.interpolation != "faceVarying" for primvar in self.primvars):
+            return self
         return self.with_primvars(self.join)
 
     def join(self, primvar: Primvar) -> Primvar:
@@ -174,3 +219,13 @@ class Polygons:
         """(P, ...) a primvar that does not split points."""
         assert not primvar.splits_points
         return np.broadcast_to(primvar.values, (len(self.points), *primvar.values.shape[1:]))
+
+
+def _unless_constant(primvar: Primvar | None) -> Primvar | None:
+    return None if primvar is not None and primvar.interpolation == "constant" else primvar
+
+
+def _add(found: blake2b, array: NDArray) -> None:
+    """The size too, so that what ends one array does not begin the next."""
+    found.update(f"{array.dtype.str}{array.shape}".encode())
+    found.update(np.ascontiguousarray(array).data)

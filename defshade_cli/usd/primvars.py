@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import cast
+from types import MappingProxyType
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.usd.color_space import in_rec709, is_color
-from defshade_cli.usd.polygons import Interpolation, Primvar
+from defshade_cli.usd.polygons import Interpolation, Polygons, Primvar
 from defshade_cli.usd.values import floats, integers
 
 DISPLAY_COLOR = "displayColor"
@@ -34,11 +35,25 @@ class Authored:
     indices: object | None = None
 
 
+class Carried(NamedTuple):
+    """What lies on a surface beside its normals; the fields are those of Polygons."""
+
+    display_color: Primvar | None = None
+    display_opacity: Primvar | None = None
+    uvs: Mapping[str, Primvar] = MappingProxyType({})
+
+    def laid_on(self, polygons: Polygons) -> Polygons:
+        return polygons if self is NOTHING_CARRIED else replace(polygons, **self._asdict())
+
+
+NOTHING_CARRIED = Carried()
+
+
 def count_elements(faces: int, points: int, corners: int) -> Elements:
     return {"constant": 1, "uniform": faces, "varying": points, "vertex": points, "faceVarying": corners}
 
 
-def authored(primvar: UsdGeom.Primvar, time: Usd.TimeCode) -> Authored | None:
+def authored(primvar: UsdGeom.Primvar | None, time: Usd.TimeCode) -> Authored | None:
     if not primvar or not primvar.HasValue():
         return None
     indices = primvar.GetIndices(time) if primvar.IsIndexed() else None
@@ -52,16 +67,27 @@ def find_display(prim: Usd.Prim, name: str) -> UsdGeom.Primvar:
     return UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
 
 
-def find_uvs(prim: Usd.Prim) -> list[UsdGeom.Primvar]:
-    """Every primvar that may be texture coordinates, two floats a value: the prim's own, and inherited constants."""
-    primvars = UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance()
-    return [primvar for primvar in primvars if primvar.GetTypeName().scalarType in _UV_TYPES]
+def find_primvars(prim: Usd.Prim) -> dict[str, UsdGeom.Primvar]:
+    """What lies on a surface, by name: its own primvars with a value, and constant ones of its ancestors."""
+    return {str(p.GetPrimvarName()): p for p in UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance()}
 
 
-def read_uvs(prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> dict[str, Primvar]:
-    """Texture coordinates by name, those that fit and are finite."""
-    read = {str(p.GetPrimvarName()): _fit_finite(authored(p, time), 2, elements, issues) for p in find_uvs(prim)}
-    return {name: primvar for name, primvar in read.items() if primvar is not None}
+def may_be_uvs(primvar: UsdGeom.Primvar) -> bool:
+    """Texture coordinates have two floats a value."""
+    return primvar.GetTypeName().scalarType in _UV_TYPES
+
+
+def read_carried(
+    prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: list[str], color: str = DISPLAY_COLOR
+) -> Carried:
+    """Colour, opacity and texture coordinates, those that fit and are finite. color: primvar that holds the colour."""
+    found = find_primvars(prim)
+    if not found:
+        return NOTHING_CARRIED
+    colors = _fit_finite(authored(found.get(color), time), 3, elements, issues)
+    opacity = _fit_finite(authored(found.get("displayOpacity"), time), 1, elements, issues)
+    uvs = {n: _fit_finite(authored(p, time), 2, elements, issues) for n, p in found.items() if may_be_uvs(p)}
+    return Carried(colors, opacity, {name: primvar for name, primvar in uvs.items() if primvar is not None})
 
 
 def read_display(

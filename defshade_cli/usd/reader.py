@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import cycle
 
 import numpy as np
+from numpy.typing import NDArray
 from pxr import Usd
 
 from defshade_cli.errors import EmptyStage
@@ -16,6 +18,7 @@ from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
 from defshade_cli.scene.light import Light
+from defshade_cli.scene.material import Material
 from defshade_cli.scene.motion import Moment, moment_of
 from defshade_cli.scene.scene import Scene, Unsupported
 from defshade_cli.settings import Complexity
@@ -30,6 +33,7 @@ from defshade_cli.usd.linking import link
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.mesh_light import Glow, Glows, glowing_lights, shown_material
 from defshade_cli.usd.palette import Palette
+from defshade_cli.usd.polygons import Polygons
 from defshade_cli.usd.settings import read_settings
 from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.tessellation import Tessellation
@@ -175,7 +179,10 @@ class StageReader:
     ) -> tuple[Camera, tuple[Unsupported, ...]]:
         """The camera; one of ours frames the surfaces as authored, however they are refined."""
         if self._camera is None:
-            boxes = (world_boxes(surface.polygons.bounds, piece.root_from_object) for piece, surface in drawn)
+            placed: dict[Polygons, list[NDArray[np.float64]]] = defaultdict(list)
+            for piece, surface in drawn:
+                placed[surface.polygons].append(piece.root_from_object)
+            boxes = (world_boxes(polygons.bounds, _joined(matrices)) for polygons, matrices in placed.items())
             return framed_camera(enclose(boxes), facts.up_axis(self._stage)), ()
         camera, issues = read_camera(self._camera, time)
         return self._settings.applied_to(camera), issues
@@ -208,6 +215,8 @@ def _drawables(
     glowing: Mapping[Piece, Glowing],
 ) -> Iterator[Drawable]:
     """What is drawn; `meshes` takes the meshes, each with its number."""
+    alike: dict[tuple[int, tuple[Subset, ...], bool | Piece], list[Piece]] = defaultdict(list)
+    unauthored: dict[tuple[Subset, ...], Material] = {}
     for piece, surface in drawn:
         gprim = gprims[surface]
         if not gprim.groups:
@@ -218,15 +227,30 @@ def _drawables(
             materials = [shown_material(material, glow, lights[0]) for material in materials]
         numbered = zip(gprim.groups, map(palette.number_of, materials), strict=True)
         subsets = tuple(Subset(number, group.first, group.count) for group, number in numbered)
-        yield Drawable(
-            mesh=meshes.setdefault(gprim.mesh, len(meshes)),
-            world_from_object=piece.root_from_object,
-            subsets=subsets,
-            paths=piece.paths,
-            instance_ids=piece.ids,
-            display_color=np.where(np.isnan(piece.display_color), materials[0].diffuse_color, piece.display_color),
-            display_opacity=np.nan_to_num(piece.display_opacity, nan=materials[0].opacity),
-        )
+        named = len(piece.paths) == len(piece.ids)
+        mesh = meshes.setdefault(gprim.mesh, len(meshes))
+        alike[mesh, subsets, named or piece].append(piece)
+        unauthored[subsets] = materials[0]
+    for (mesh, subsets, _), pieces in alike.items():
+        yield _drawable(mesh, subsets, pieces, unauthored[subsets])
+
+
+def _drawable(mesh: int, subsets: tuple[Subset, ...], pieces: Sequence[Piece], unauthored: Material) -> Drawable:
+    """Pieces of the same looks as instances of one mesh. unauthored: has the colour of those that have none."""
+    color, opacity = _joined([p.display_color for p in pieces]), _joined([p.display_opacity for p in pieces])
+    return Drawable(
+        mesh=mesh,
+        world_from_object=_joined([piece.root_from_object for piece in pieces]),
+        subsets=subsets,
+        paths=tuple(path for piece in pieces for path in piece.paths),
+        instance_ids=_joined([piece.ids for piece in pieces]),
+        display_color=np.where(np.isnan(color), unauthored.diffuse_color, color),
+        display_opacity=np.nan_to_num(opacity, nan=unauthored.opacity),
+    )
+
+
+def _joined(arrays: Sequence[NDArray]) -> NDArray:
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
 def _paths(drawables: Iterable[Drawable]) -> dict[str, None]:

@@ -2,33 +2,78 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import NamedTuple
+from weakref import WeakKeyDictionary, ref
+
 from defshade_cli.usd.control import Control
-from defshade_cli.usd.geometry import Gprim, Surface, tessellate
+from defshade_cli.usd.geometry import FaceGroup, Gprim, Surface, tessellate
+from defshade_cli.usd.polygons import Polygons
 from defshade_cli.usd.refiner import Refiner
 
 
 class Tessellation:
     """The last triangles of each surface, and the stencils that they were made with.
 
-    The same surface at the same level gives the same object. Points that move under a topology that does not are
-    refined by the same stencils.
+    The same surface at the same level gives the same object, and surfaces that share their polygons share the mesh.
+    Points that move under a topology that does not are refined by the same stencils.
     """
 
     def __init__(self) -> None:
         self._gprims: dict[str, tuple[Surface, int, Gprim]] = {}
+        self._of_shape: WeakKeyDictionary[Polygons, list[_Alike]] = WeakKeyDictionary()
         self._refiners: dict[str, Refiner] = {}
 
     def at_level(self, surface: Surface, level: int) -> Gprim:
         """Level 0 is the cage; what is no subdivision surface has no other."""
         known, at, gprim = self._gprims.get(surface.path, (None, 0, None))
         if gprim is None or known is not surface or at != level:
-            refiner = self._refiner(surface.path, surface.control, level) if surface.control and level else None
-            gprim = tessellate(surface, refiner, gprim if at == level else None)
+            last = gprim if at == level else None
+            cut = self._shared if surface.faces.group is None else self._cut
+            gprim = cut(surface, level, last)
             self._gprims[surface.path] = surface, level, gprim
         return gprim
+
+    def _shared(self, surface: Surface, level: int, last: Gprim | None) -> Gprim:
+        """The triangles of all surfaces with this shape that are in use."""
+        alike = [one for one in self._of_shape.get(surface.polygons, ()) if one.gprim() is not None]
+        for one in alike:
+            gprim = one.gprim()
+            if gprim is not None and one.serves(surface, level):
+                return _renamed(gprim, surface)
+        gprim = self._cut(surface, level, last)
+        alike.append(_Alike(surface.control, surface.double_sided, level, ref(gprim)))
+        self._of_shape[surface.polygons] = alike
+        return gprim
+
+    def _cut(self, surface: Surface, level: int, last: Gprim | None) -> Gprim:
+        refiner = self._refiner(surface.path, surface.control, level) if surface.control and level else None
+        return tessellate(surface, refiner, last)
 
     def _refiner(self, path: str, control: Control, level: int) -> Refiner:
         known = self._refiners.get(path)
         if known is None or not known.fits(control, level):
             known = self._refiners[path] = Refiner(control, level)
         return known
+
+
+class _Alike(NamedTuple):
+    """Triangles, and what they were made of beside polygons."""
+
+    control: Control | None
+    double_sided: bool
+    level: int
+    gprim: ref[Gprim]
+
+    def serves(self, surface: Surface, level: int) -> bool:
+        if level != self.level or surface.double_sided != self.double_sided:
+            return False
+        mine, other = self.control, surface.control
+        return mine is other or (mine is not None and other is not None and mine.equals(other))
+
+
+def _renamed(gprim: Gprim, surface: Surface) -> Gprim:
+    """The same triangles, all of one group, for another prim."""
+    groups = tuple(FaceGroup(surface.faces.paths[0], group.first, group.count) for group in gprim.groups)
+    issues = tuple(replace(issue, path=surface.path) for issue in gprim.issues)
+    return Gprim(gprim.mesh, groups, issues, replace(gprim.cut, faces=surface.faces, groups=groups))

@@ -25,6 +25,8 @@ from defshade_cli.usd.color_space import texture_space
 from defshade_cli.usd.network import Network, computed, node_of
 
 _READERS = ("UsdPrimvarReader_float2", "UsdPrimvarReader_float3", "UsdPrimvarReader_float4")
+_MOST_TRANSFORMS = 64
+"""One after another; a network of more is taken for one that runs in a circle."""
 
 
 class Unreadable(Exception):
@@ -69,7 +71,7 @@ def _of_channel(channel: Channel, value: Any) -> Four:
     return four if channel == "rgb" else (four["rgba".index(channel)],) * 4
 
 
-def _coordinates(network: Network, source: Usd.Attribute | None) -> tuple[str, Affine]:
+def _coordinates(network: Network, source: Usd.Attribute | None, left: int = _MOST_TRANSFORMS) -> tuple[str, Affine]:
     """(primvar, texture_from_uv) of what feeds `st`, transforms multiplied together; no primvar for a constant."""
     if source is None or not computed(source):
         u, v = _floats((source and network.of(source)) or (0, 0), 2)
@@ -79,7 +81,9 @@ def _coordinates(network: Network, source: Usd.Attribute | None) -> tuple[str, A
         return str(network.value(node, "varname", "")), IDENTITY
     if identifier != "UsdTransform2d":
         raise Unreadable(f"texture coordinates of {identifier}")
-    uv, below = _coordinates(network, network.source(node, "in"))
+    if not left:
+        raise Unreadable("texture coordinates that run in a circle")
+    uv, below = _coordinates(network, network.source(node, "in"), left - 1)
     return uv, _product(_transform(network, node), below)
 
 

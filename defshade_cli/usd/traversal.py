@@ -82,18 +82,26 @@ class Traversal:
         mode = handed_down(prim, above.draw_mode) if above.draw_mode else None
         if not prim.IsA(UsdGeom.Imageable):
             return above if mode == above.draw_mode else above._replace(draw_mode=mode)
-        visibility = prim.GetAttribute(UsdGeom.Tokens.visibility)
-        if visibility.Get(self._time) == UsdGeom.Tokens.invisible:
-            self.dormant |= visibility.ValueMightBeTimeVarying()
+        said = prim.GetAuthoredPropertyNames()
+        if UsdGeom.Tokens.visibility in said and not self._is_visible(prim):
             return None
         local, resets = self._memory.xforms.GetLocalTransformation(prim)
         root_from_prim = local if resets else local * above.root_from_prim
-        purpose = prim.GetAttribute(UsdGeom.Tokens.purpose)
-        own = str(purpose.Get()) if purpose.HasAuthoredValue() else above.purpose
+        own = above.purpose
+        if UsdGeom.Tokens.purpose in said:
+            purpose = prim.GetAttribute(UsdGeom.Tokens.purpose)
+            own = str(purpose.Get()) if purpose.HasAuthoredValue() else own
         here = above._replace(
             root_from_prim=root_from_prim, in_world=resets or above.in_world, purpose=own, draw_mode=mode
         )
         return here.with_rig(prim) if prim.IsA(UsdSkel.Root) else here
+
+    def _is_visible(self, prim: Usd.Prim) -> bool:
+        visibility = prim.GetAttribute(UsdGeom.Tokens.visibility)
+        if visibility.Get(self._time) != UsdGeom.Tokens.invisible:
+            return True
+        self.dormant |= visibility.ValueMightBeTimeVarying()
+        return False
 
     def _own_pieces(self, prim: Usd.Prim, kind: Kind, here: Standing) -> Iterator[Piece]:
         """What the prim itself is, whatever stands below it."""

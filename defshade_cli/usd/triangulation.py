@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.spaces import cross
 from defshade_cli.usd.ears import clip_ears
 from defshade_cli.usd.normals import vector_areas
 from defshade_cli.usd.polygons import Polygons
@@ -50,8 +51,10 @@ def _cut(points: NDArray[np.float32], indices: NDArray) -> NDArray[np.intp]:
 
 def _folded(quads: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Do the triangles beside diagonal 0–2 of quads (B, 4, 3) face apart, more so than those beside 1–3?"""
-    a, b, c, d = np.moveaxis(quads, 1, 0)
+    a, b, c, d = quads.swapaxes(0, 1)
     folded = _agreement(a, b, c, d) <= 0.0
+    if not folded.any():
+        return folded
     a, b, c, d = quads[folded].swapaxes(0, 1)
     folded[folded] = _agreement(b, c, d, a) > _agreement(a, b, c, d)
     return folded
@@ -59,7 +62,7 @@ def _folded(quads: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def _agreement(a: NDArray, b: NDArray, c: NDArray, d: NDArray) -> NDArray[np.float64]:
     """(B,) the product of the normals of triangles abc and acd, areas included."""
-    return np.einsum("bi,bi->b", np.cross(b - a, c - a), np.cross(c - a, d - a))
+    return np.einsum("bi,bi->b", cross(b - a, c - a), cross(c - a, d - a))
 
 
 def _cut_large(corners: NDArray[np.float64]) -> NDArray[np.intp]:

@@ -46,7 +46,8 @@ def read_coordinates(graph: Graph, node: UsdShade.Shader, name: str = "texcoord"
     read = _READERS.get(category := category_of(identifier, _READERS))
     if read is None:
         raise Unread(f"texture coordinates of {category}")
-    return read(graph, producer)
+    with graph.step():
+        return read(graph, producer)
 
 
 def placed(graph: Graph, node: UsdShade.Shader) -> Coordinates:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -61,13 +62,20 @@ class Graph:
         node, identifier = node_of(output)
         name, width = output.GetName().rpartition(":")[2], _width(output)
         evaluate = self.evaluators.get(category := category_of(identifier, self.evaluators))
+        with self.step():
+            try:
+                return evaluate(self, node, name, width) if evaluate else self._past(node, category, width)
+            except NonLinear:
+                return self._past(node, category, width)
+
+    @contextmanager
+    def step(self) -> Iterator[None]:
+        """One node further. Raises Unread where there have been too many."""
         if self._depth >= _DEEPEST:
             raise Unread("a network that runs in a circle")
         self._depth += 1
         try:
-            return evaluate(self, node, name, width) if evaluate else self._past(node, category, width)
-        except NonLinear:
-            return self._past(node, category, width)
+            yield
         finally:
             self._depth -= 1
 
