@@ -314,6 +314,12 @@ def test_inspect_shows_what_is_there() -> None:
     assert "1 triangles" in shown
 
 
+def test_inspect_times_the_steps_of_a_frame() -> None:
+    record = json.loads(succeed("inspect", "stages/triangle.usda", "--timing", "--json", *SMALL).stdout)
+    assert list(record["seconds"]) == ["open", "read", "plan", "context", "upload", "draw"]
+    assert all(seconds >= 0.0 for seconds in record["seconds"].values())
+
+
 def test_inspect_as_json() -> None:
     record = json.loads(succeed("inspect", "stages/triangle.usda", "--json", *SMALL).stdout)
     assert record["camera"] == "/Eye"

@@ -207,3 +207,11 @@ def test_moving_curves_vary() -> None:
     schema.GetWidthsAttr().Set([1.0], 1.0)
     schema.GetWidthsAttr().Set([2.0], 2.0)
     assert is_time_varying(schema.GetPrim())
+
+
+def test_curves_that_cannot_be_closed_are_open_and_it_is_said() -> None:
+    """A periodic Bézier curve takes three points a segment: of four it makes one, open, as in Hydra."""
+    drawn = read(curves([(0, 0, -1), (-1, 0, -0.5), (-1, 0, 0.5), (0, 0, 1)], [4], "bezier", wrap="periodic"))
+    ends = drawn.mesh.points[np.abs(np.abs(drawn.mesh.points[:, 2]) - 1.0) < 0.5]
+    assert len(drawn.mesh.triangles) and len(ends)
+    assert "its curves are drawn open: they have too few points to be closed, or some too many" in reasons(drawn)

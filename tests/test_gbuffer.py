@@ -194,3 +194,14 @@ def test_clipping_planes_cut_in_camera_space(gpu: Gpu) -> None:
     assert (-x <= 1.0).all() and (y >= 0.5).all()
     # The image is 5 units wide and high: 3.5 and 2 of them are left.
     assert seen.sum() == 28 * 16
+
+
+@pytest.mark.parametrize("turned", [0.0, 90.0])
+def test_one_clipping_plane_cuts_wherever_the_camera_stands(pipeline: Pipeline, turned: float) -> None:
+    """What lies to the camera's left goes; the next frame without planes is whole."""
+    world_from_camera = rotated("z", turned) @ translation(np.array([0.0, 0.0, 4.0]))
+    whole = scene([quad(9.0)], [sun()], view=replace(camera(half=1.0), world_from_camera=world_from_camera))
+    halved = replace(whole, camera=replace(whole.camera, clipping_planes=np.array([[1.0, 0.0, 0.0, 0.0]])))
+    depth = stored(pipeline, halved, "float")["depth"]
+    assert (depth[:, :32] == 0.0).all() and (depth[:, 32:] > 0.0).all()
+    assert (stored(pipeline, whole, "float")["depth"] > 0.0).all()

@@ -59,6 +59,10 @@ CARRIED = """point3f[] points.timeSamples = { 1: [(0, -1, 0), (1, -1, 0), (1, 1,
 def _stage(quad: str, camera: str = FIXED, shutter: tuple[float, float] = (0.0, 1.0)) -> StageReader:
     opened = CAMERA.replace("OPEN", str(shutter[0])).replace("CLOSE", str(shutter[1])).replace("WHERE", camera)
     text = QUAD.replace("WHERE", quad)
+    if "faceVertexCounts" in quad:
+        text = text.replace("int[] faceVertexCounts = [4]\n", "").replace(
+            "int[] faceVertexIndices = [0, 1, 2, 3]\n", ""
+        )
     if "points" in quad:
         text = text.replace("point3f[] points = [(0, -1, 0), (1, -1, 0), (1, 1, 0), (0, 1, 0)]\n", "")
     return StageReader(stage_of(opened + text, "timeCodesPerSecond = 24\nmetersPerUnit = 1"), size=(WIDTH, HEIGHT))
@@ -170,3 +174,37 @@ def test_a_stage_on_disk_is_blurred(tmp_path: Path) -> None:
     )
     assert set(np.unique(sharp)) == {0.0, 1.0}
     assert len(np.unique(blurred)) > 4
+
+
+BURST = """point3f[] points.timeSamples = {
+        0: [(0, 0, 0), (0, 1, 0), (1, 1, 0)],
+        1: [(0, -1, 0), (1, -1, 0), (1, 1, 0), (0, 1, 0)]
+    }
+    vector3f[] velocities.timeSamples = { 0: [(0, 0, 0)], 1: [(48, 0, 0), (48, 0, 0), (48, 0, 0), (48, 0, 0)] }
+    int[] faceVertexCounts.timeSamples = { 0: [3], 1: [4] }
+    int[] faceVertexIndices.timeSamples = { 0: [0, 1, 2], 1: [0, 1, 2, 3] }
+"""
+
+
+def test_what_velocities_carry_has_the_frames_topology_while_the_shutter_is_open() -> None:
+    reader = _stage(BURST, shutter=(-0.5, 0.5))
+    scene = reader.read(1.0)
+    moments = reader.read_shutter(scene, 2)
+    early, late = (next(moments).meshes[0].points for _ in range(2))
+    np.testing.assert_allclose(early, scene.meshes[0].points - np.float32([0.5, 0, 0]), atol=1e-6)
+    np.testing.assert_allclose(late, scene.meshes[0].points + np.float32([0.5, 0, 0]), atol=1e-6)
+
+
+def test_copies_are_those_of_the_frame_while_the_shutter_is_open() -> None:
+    text = """def PointInstancer "swarm" {
+        rel prototypes = </swarm/cube>
+        int[] protoIndices.timeSamples = { 0: [0], 1: [0, 0] }
+        point3f[] positions.timeSamples = { 0: [(9, 9, 9)], 1: [(0, 0, 0), (4, 0, 0)] }
+        vector3f[] velocities.timeSamples = { 0: [(0, 0, 0)], 1: [(24, 0, 0), (0, 0, 0)] }
+        def Cube "cube" {
+        }
+    }"""
+    camera = CAMERA.replace("OPEN", "-1").replace("CLOSE", "0").replace("WHERE", FIXED)
+    reader = StageReader(stage_of(camera + text, "timeCodesPerSecond = 24"))
+    (moment,) = next(reader.read_shutter(reader.read(1.0), 1)).drawables
+    np.testing.assert_allclose(moment.world_from_object[:, :3, 3], [(-0.5, 0, 0), (4, 0, 0)], atol=1e-6)

@@ -81,3 +81,15 @@ def test_moving_points_make_the_prim_vary() -> None:
     moving = stages.stage_of(text.format(".timeSamples = {1: [(0,0,0)], 2: [(1,0,0)]}"))
     assert not is_time_varying(still.GetPrimAtPath("/dust"))
     assert is_time_varying(moving.GetPrimAtPath("/dust"))
+
+
+def test_points_stay_round_under_any_scale() -> None:
+    """As wide as in RenderMan and Hydra: by the length of what (1, 1, 1) / √3 becomes."""
+    scene = read(
+        "float[] widths = [1, 0.5, 2]\n    float3 xformOp:scale = (0.5, -0.5, 1)\n"
+        '    uniform token[] xformOpOrder = ["xformOp:scale"]'
+    )
+    wide = np.sqrt((0.25 + 0.25 + 1.0) / 3.0)
+    placed = scene.drawables[0].world_from_object
+    np.testing.assert_allclose(placed[:, :3, :3], np.array([1, 0.5, 2])[:, None, None] * wide * np.eye(3), rtol=1e-6)
+    np.testing.assert_allclose(placed[1, :3, 3], [0.5, -1.0, 3.0])

@@ -85,7 +85,7 @@ def test_payloads_are_loaded(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("metadata", "axis"), [("", "Y"), ('upAxis = "Z"', "Z"), ('upAxis = "X"', "Y"), ('upAxis = "up"', "Y")]
+    ("metadata", "axis"), [("", "Y"), ('upAxis = "Z"', "Z"), ('upAxis = "X"', "Z"), ('upAxis = "up"', "Z")]
 )
 def test_the_up_axis_is_y_or_z(metadata: str, axis: str) -> None:
     assert up_axis(stage_of("", metadata)) == axis

@@ -26,26 +26,33 @@ _EPILOG = epilog(
     "defshade inspect scene.usda",
     "defshade inspect shot.usd --frames 12 --plan",
     "defshade inspect scene.usda --json",
+    "defshade inspect scene.usda --timing --width 960",
 )
 
 
 @click.command(cls=HeadedCommand, epilog=_EPILOG)
 @takes_stage
 @click.option("--plan", "with_plan", is_flag=True, help="Add what the renderer decides for this stage, and why.")
+@click.option("--timing", is_flag=True, help="Draw the first frame too, and add what each step of it takes.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON in place of a tree.")
-def inspect(job: RenderJob, as_json: bool, with_plan: bool) -> None:
+def inspect(job: RenderJob, as_json: bool, with_plan: bool, timing: bool) -> None:
     """Show what a render of SCENE would see.
 
     Cameras, lights and the volumes they are drawn as, materials, geometry, and the prims that would be left out. It
-    renders nothing and needs no graphics device.
+    renders nothing and needs no graphics device, but for --timing.
     """
-    from defshade_cli.rendering import examine
+    from defshade_cli.rendering import examine, time_steps
 
     scene, plan = examine(job)
+    seconds = time_steps(job) if timing else {}
     if as_json:
-        click.echo(json.dumps(plain(_record(job, scene, plan)), indent=2, allow_nan=False))
-    else:
-        _show(_tree(job, scene, plan, with_plan))
+        record = _record(job, scene, plan) | ({"seconds": seconds} if timing else {})
+        click.echo(json.dumps(plain(record), indent=2, allow_nan=False))
+        return
+    tree = _tree(job, scene, plan, with_plan)
+    if timing:
+        _branch(tree, "time", [f"{step}: {taken:.3f} s" for step, taken in seconds.items()], counted=False)
+    _show(tree)
 
 
 def _record(job: RenderJob, scene: Scene, plan: Plan) -> dict[str, Any]:

@@ -118,4 +118,5 @@ class GBufferPass:
         if self._clip_distances:
             planes = camera.clipping_planes.copy()
             planes[:, :3] @= camera.world_from_camera[:3, :3].T
-            self._program["clipping_planes"] = [tuple(plane) for plane in planes.tolist()]
+            values = [tuple(plane) for plane in planes.tolist()]
+            self._program["clipping_planes"] = values if len(values) > 1 else values[0]

@@ -59,13 +59,27 @@ class Pipeline:
         self._accumulation = AccumulationPass(gpu, self._frame, self._screen)
         self._stopping = Stopping(gpu, self._frame, self._screen, self._mask)
 
-    def render(self, scene: Scene, plan: Plan, moments: Iterator[ShutterSample] | None = None) -> Film:
+    def upload(self, scene: Scene, plan: Plan) -> DrawList:
+        """The scene on the GPU, when all of it has arrived. Raises GpuError."""
+        self._gpu.make_current()
+        draws = self._resident(scene, plan)
+        self._gpu.context.finish()
+        return draws
+
+    def render(
+        self,
+        scene: Scene,
+        plan: Plan,
+        moments: Iterator[ShutterSample] | None = None,
+        uploaded: DrawList | None = None,
+    ) -> Film:
         """The plan's layers. Raises GpuError.
 
         moments: what samples see in turn, where the plan has motion blur; data layers show the scene itself.
+        uploaded: of this scene, where that has been done before.
         """
         self._gpu.make_current()
-        draws = self._resident(scene, plan)
+        draws = uploaded or self._resident(scene, plan)
         layers: Layers = {}
         manifests: Manifests = {}
         sampling = Sampling(1, 1.0, 1)

@@ -6,6 +6,6 @@ renderer   the graphics devices that they are drawn on
 
 from defshade_cli.rendering.renderer import Renderer
 from defshade_cli.rendering.results import FrameResult, ImageResult
-from defshade_cli.rendering.story import examine, render, run
+from defshade_cli.rendering.story import examine, render, run, time_steps
 
-__all__ = ["FrameResult", "ImageResult", "Renderer", "examine", "render", "run"]
+__all__ = ["FrameResult", "ImageResult", "Renderer", "examine", "render", "run", "time_steps"]

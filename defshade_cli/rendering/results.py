@@ -14,7 +14,7 @@ class ImageResult:
     """What became of one image.
 
     paths: the files written, or found where `skipped`.  film, plan: None where skipped.
-    seconds: wall time per step: read, plan, context, draw, write.
+    seconds: wall time per step: read, plan, context, upload, draw, write.
     """
 
     paths: tuple[Path, ...]

@@ -22,7 +22,7 @@ from defshade_cli.plan import Plan, make_plan, plan_moments
 from defshade_cli.rendering.renderer import Renderer
 from defshade_cli.rendering.results import FrameResult, ImageResult
 from defshade_cli.scene.scene import Scene
-from defshade_cli.settings import Composition, RenderJob, RenderSettings
+from defshade_cli.settings import Composition, OutputSettings, RenderJob, RenderSettings
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,6 +76,16 @@ def examine(job: RenderJob) -> tuple[Scene, Plan]:
     shot = opened.shots(opened.frames[0])[0]
     scene = opened.reader(shot.product).read(shot.frame)
     return scene, make_plan(scene, shot.job.settings)
+
+
+def time_steps(job: RenderJob) -> dict[str, float]:
+    """Wall time of each step of the first frame: open, read, plan, context, upload, draw. Nothing is written.
+
+    Raises the errors of errors.py.
+    """
+    with closing(run(replace(job, frames=job.frames[:1], output=OutputSettings()))) as results:
+        seconds = next(results).seconds
+    return {step: taken for step, taken in seconds.items() if step != "write"}
 
 
 def render(
@@ -145,9 +155,11 @@ def _draw(shot: Shot, opened: OpenJob, renderer: Renderer, command: str) -> _Dra
         plan = make_plan(scene, job.settings)
     with _timed(seconds, "context"):
         pipeline = renderer.pipeline(job.device)
+    with _timed(seconds, "upload"):
+        uploaded = pipeline.upload(scene, plan)
     with _timed(seconds, "draw"):
         moments = plan_moments(plan, reader.read_shutter(scene, plan.moments), job.settings)
-        film = pipeline.render(scene, plan, moments)
+        film = pipeline.render(scene, plan, moments, uploaded)
     facts = _provenance(shot, command) | film.metadata | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of}
     return _Drawn(shot, replace(film, metadata=facts), plan, seconds)
 

@@ -66,6 +66,11 @@ def read_control(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode, iss
     return Control(topology, _face_varying(mesh, time, issues))
 
 
+def smooth_control(polygons: Polygons) -> Control | None:
+    """Of a cage without creases, corners or holes; None where the polygons are the surface."""
+    return None if polygons.scheme == "none" else Control(_plain_topology(polygons))
+
+
 def _plain_topology(polygons: Polygons) -> Topology:
     """With the schema's rules, and without creases and corners; once for polygons that surfaces share."""
     if polygons not in _PLAIN:

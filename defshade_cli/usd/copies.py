@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,17 @@ def once(display_color: NDArray[np.float32] | None = None, display_opacity: floa
         np.full((1, 3), color, np.float32),
         np.full(1, opacity, np.float32),
     )
+
+
+def rounded(world_from_copy: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 4, 4) that scale alike along all axes, by the length of what (1, 1, 1) / √3 becomes.
+
+    Points stay spheres under any transform, as wide as in RenderMan and Hydra (points.glslfx).
+    """
+    scale = np.linalg.norm(world_from_copy[:, :3, :3].sum(axis=2), axis=1) / math.sqrt(3.0)
+    round_ones = world_from_copy.copy()
+    round_ones[:, :3, :3] = scale[:, None, None] * np.eye(3)
+    return round_ones
 
 
 _ONCE = Copies(

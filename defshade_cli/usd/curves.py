@@ -41,7 +41,7 @@ def read_curves(
     if not np.isfinite(points).all():
         issues.append("it is left out: not all of its points are finite")
         counts = counts[:0]
-    kind = _kind(curves)
+    kind = _closable(_kind(curves), counts, issues)
     samples, sides = _detailed(kind, counts, len(points))
     if samples.left_out:
         issues.append(f"{samples.left_out} curves are left out: they have too few points, or cannot be closed")
@@ -62,6 +62,15 @@ def _complete(counts: NDArray[np.integer], available: int, issues: list[str]) ->
 def _kind(curves: UsdGeom.BasisCurves) -> Kind:
     basis = "linear" if curves.GetTypeAttr().Get() == UsdGeom.Tokens.linear else curves.GetBasisAttr().Get()
     return Kind(str(basis), str(curves.GetWrapAttr().Get()))
+
+
+def _closable(kind: Kind, counts: NDArray[np.int64], issues: list[str]) -> Kind:
+    """Periodic curves that no number of segments closes are open ones, as in Hydra."""
+    as_open = Kind(kind.basis, "nonperiodic")
+    if not kind.closed or kind.segments(counts).any() or not as_open.segments(counts).any():
+        return kind
+    issues.append("its curves are drawn open: they have too few points to be closed, or some too many")
+    return as_open
 
 
 def _detailed(kind: Kind, counts: NDArray[np.int64], points: int) -> tuple[CurveSamples, int]:

@@ -14,7 +14,7 @@ from pxr import Usd, UsdGeom
 
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.scene.scene import Unsupported
-from defshade_cli.usd.control import CONTROL_ATTRIBUTES, Control, read_control
+from defshade_cli.usd.control import CONTROL_ATTRIBUTES, Control, read_control, smooth_control
 from defshade_cli.usd.copies import Copies
 from defshade_cli.usd.curves import CURVES_ATTRIBUTES, read_curves
 from defshade_cli.usd.cut import Cut, cut, varies
@@ -98,16 +98,18 @@ def read_surface(
     color: str = DISPLAY_COLOR,
     shown: tuple[str, ...] = (),
     shapes: Shapes | None = None,
+    *,
+    as_cages: bool = False,
 ) -> Surface | None:
     """The surface of `prim`; None for a type that is no supported surface. Bad data becomes issues, never raises.
 
     A surface of which nothing can be drawn has no groups, and issues that say why.
     color: primvar to take for displayColor.  shown: primvars for layers.
-    shapes: of other prims, whose polygons it shares where they are equal.
+    shapes: of other prims, whose polygons it shares where they are equal.  as_cages: see gprims.read_solid.
     """
     issues: list[str] = []
     path = str(prim.GetPath())
-    polygons, copies = _read_shape(prim, time, issues, color)
+    polygons, copies = _read_shape(prim, time, issues, color, as_cages)
     if polygons is None:
         return None
     if shown:
@@ -115,7 +117,8 @@ def read_surface(
     display_color, opacity = _constant(polygons.display_color), _constant(polygons.display_opacity)
     if shapes is not None:
         polygons = shapes.shared(polygons.without_constants())
-    control = read_control(UsdGeom.Mesh(prim), polygons, time, issues) if prim.IsA(UsdGeom.Mesh) else None
+    is_mesh = prim.IsA(UsdGeom.Mesh)
+    control = read_control(UsdGeom.Mesh(prim), polygons, time, issues) if is_mesh else smooth_control(polygons)
     faces = read_faces(prim, time, issues)
     return Surface(
         path=path,
@@ -148,10 +151,12 @@ def tessellate(surface: Surface, refiner: Refiner | None = None, last: Gprim | N
     return Gprim(mesh, made.groups, tuple(Unsupported(surface.path, issue) for issue in made.issues), made)
 
 
-def move_surface(surface: Surface, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
-    """The same with the points of another time; None where they do not fit what stays."""
+def move_surface(
+    surface: Surface, prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode | None = None
+) -> Surface | None:
+    """The same with the points of another time, as read_positions has them; None where they do not fit what stays."""
     polygons = surface.polygons
-    points = read_positions(prim, time)
+    points = read_positions(prim, time, base)
     if points is None or points.shape != polygons.points.shape or not np.isfinite(points[polygons.indices]).all():
         return None
     return replace(surface, polygons=replace(polygons, points=points))
@@ -188,7 +193,7 @@ def _carried(prim: Usd.Prim, color: str) -> list[UsdGeom.Primvar]:
 
 
 def _read_shape(
-    prim: Usd.Prim, time: Usd.TimeCode, issues: list[str], color: str
+    prim: Usd.Prim, time: Usd.TimeCode, issues: list[str], color: str, as_cages: bool
 ) -> tuple[Polygons | None, Copies | None]:
     if prim.IsA(UsdGeom.Mesh):
         return read_mesh(UsdGeom.Mesh(prim), time, issues, color), None
@@ -198,7 +203,7 @@ def _read_shape(
         return read_curves(UsdGeom.BasisCurves(prim), time, issues, color), None
     if prim.IsA(UsdGeom.NurbsPatch):
         return read_patch(UsdGeom.NurbsPatch(prim), time, issues, color), None
-    return read_solid(prim, time, issues, color), None
+    return read_solid(prim, time, issues, color, as_cage=as_cages), None
 
 
 def _attributes(prim: Usd.Prim) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd
 
+from defshade_cli.usd.cages import capsule_cage, cone_cage, frustum_cage, sphere_cage
 from defshade_cli.usd.polygons import Polygons
 from defshade_cli.usd.primvars import DISPLAY_COLOR, Elements, count_elements, read_carried
 from defshade_cli.usd.revolution import SEGMENTS, Strip, arc, disk, revolve, side
@@ -88,6 +89,13 @@ _GPRIMS: dict[str, tuple[Callable[..., Polygons], tuple[str, ...]]] = {
 }
 """Of each type what builds it, and the attributes that go into that."""
 
+_CAGES: dict[Callable[..., Polygons], Callable[..., Polygons]] = {
+    sphere: sphere_cage,
+    frustum: frustum_cage,
+    cone: cone_cage,
+    capsule: capsule_cage,
+}
+
 
 def size_attributes(prim: Usd.Prim) -> tuple[str, ...]:
     """What is read of a gprim and may vary over time, besides primvars; nothing for other types."""
@@ -95,11 +103,17 @@ def size_attributes(prim: Usd.Prim) -> tuple[str, ...]:
     return names
 
 
-def read_solid(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR) -> Polygons | None:
-    """The gprim tessellated; None for any other type, no faces where a size is no size."""
+def read_solid(
+    prim: Usd.Prim, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR, *, as_cage: bool = False
+) -> Polygons | None:
+    """The gprim tessellated; None for any other type, no faces where a size is no size.
+
+    as_cage: a curved solid is the cage that Hydra subdivides.
+    """
     if prim.GetTypeName() not in _GPRIMS:
         return None
     build, names = _GPRIMS[prim.GetTypeName()]
+    build = _CAGES.get(build, build) if as_cage else build
     axis = _axis(prim, issues)
     if build is plane and axis != "Z":
         names = names[::-1]  # length comes first in cyclic order, by the schema's table of axes
@@ -117,7 +131,7 @@ def _built(build: Callable[..., Polygons], axis: str, sizes: tuple[float | None,
 
 def _elements(polygons: Polygons) -> Elements:
     """A curved solid is tessellated as we like, so that only a constant has a meaning on it."""
-    if polygons.normals is not None:
+    if polygons.normals is not None or polygons.scheme != "none":
         return {"constant": 1}
     return count_elements(len(polygons.counts), len(polygons.points), len(polygons.indices))
 

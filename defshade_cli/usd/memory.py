@@ -12,6 +12,7 @@ from defshade_cli.usd.binding import NOTHING_ABOVE, Bindings, Bound, read_bound
 from defshade_cli.usd.geometry import Surface, is_time_varying, move_surface, only_points_vary, read_surface
 from defshade_cli.usd.kind import Kinds
 from defshade_cli.usd.material import ReadMaterial, read_material
+from defshade_cli.usd.positions import is_carried_by_velocities
 from defshade_cli.usd.primvars import DISPLAY_COLOR
 from defshade_cli.usd.shapes import Shapes
 from defshade_cli.usd.sharing import shared
@@ -22,15 +23,15 @@ from defshade_cli.usd.subsets import material_subsets
 class Memory:
     """The unchanging parts of one stage, and the names of what stands in its prototypes.
 
-    kinds: of prims.  rigs: what skeletons deform.
+    as_cages: see gprims.read_solid.  kinds: of prims.  rigs: what skeletons deform.
     xforms: USD's cache, which drops only what varies when its time is set.
     """
 
-    def __init__(self, stage: Usd.Stage, extras: Extras = NO_EXTRAS) -> None:
+    def __init__(self, stage: Usd.Stage, extras: Extras = NO_EXTRAS, *, as_cages: bool = False) -> None:
         self.kinds = Kinds()
         self.rigs = Rigs()
         self.xforms = UsdGeom.XformCache()
-        self._stage, self._extras = stage, extras
+        self._stage, self._extras, self._as_cages = stage, extras, as_cages
         self._shapes = Shapes()
         self._surfaces: dict[Sdf.Path, tuple[Usd.TimeCode, Surface | None]] = {}
         self._time_varying: dict[Sdf.Path, bool] = {}
@@ -39,6 +40,16 @@ class Memory:
         self._first_instances: dict[str, str] = {}
         self._models = draw_mode.StandIns()
         self._stand_ins: dict[tuple[Sdf.Path, str], Surface] = {}
+
+    def surface_around(self, prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode) -> Surface | None:
+        """The surface at a time near `base`, a frame. A mesh that velocities carry has what it has at the frame.
+
+        So its points keep their number while the shutter is open, whatever samples lie within.
+        """
+        if time == base or not prim.IsA(UsdGeom.Mesh) or not is_carried_by_velocities(prim, time):
+            return self.surface(prim, time)
+        rest = self.surface(prim, base)
+        return (move_surface(rest, prim, time, base) if rest and rest.groups else None) or rest
 
     def surface(self, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
         """The same object at every time, unless something of the prim varies."""
@@ -58,7 +69,7 @@ class Memory:
 
     def _read_surface(self, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
         color = self._color_primvar(prim, time)
-        surface = read_surface(prim, time, color, self._extras.primvars, self._shapes)
+        surface = read_surface(prim, time, color, self._extras.primvars, self._shapes, as_cages=self._as_cages)
         return None if surface is None else self._as_shown(surface, prim.GetPath())
 
     def stand_in(self, prim: Usd.Prim, mode: str) -> Surface:

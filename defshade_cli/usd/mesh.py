@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.usd.normals import mend_normals
 from defshade_cli.usd.polygons import SCHEMES, Polygons, Primvar, Scheme
@@ -23,6 +23,7 @@ from defshade_cli.usd.values import integers
 MESH_ATTRIBUTES = ("points", "faceVertexCounts", "faceVertexIndices", "holeIndices", "normals")
 """What is read of a Mesh that may vary over time, besides primvars."""
 
+_POINTS = Sdf.ValueTypeNames.Point3fArray.type
 _NONE = np.empty(0, np.int32)
 
 
@@ -51,7 +52,8 @@ def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str], color: 
 def _points(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> NDArray[np.float32]:
     points = read_positions(mesh.GetPrim(), time)
     if points is None or not len(points):
-        issues.append("it has no points")
+        type_name = mesh.GetPointsAttr().GetTypeName()
+        issues.append("it has no points" if type_name.type == _POINTS else f"its points are {type_name}, not point3f[]")
         return np.empty((0, 3), np.float32)
     return points
 

@@ -24,21 +24,22 @@ class Swarm:
     issues: tuple[str, ...] = ()
 
 
-def read_point_instancer(prim: Usd.Prim, time: Usd.TimeCode) -> Swarm:
+def read_point_instancer(prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode) -> Swarm:
     """The copies of a PointInstancer in its own space, the prototypes' own transforms not yet applied.
 
+    Which they are is read at the base, a frame, and where they are at a time near it.
     Masked instances are gone: inactiveIds, invisibleIds, an index without prototype, a transform that is not finite.
     """
     instancer, issues = UsdGeom.PointInstancer(prim), list[str]()
-    indices = np.asarray(instancer.GetProtoIndicesAttr().Get(time) or [], np.int64)
+    indices = np.asarray(instancer.GetProtoIndicesAttr().Get(base) or [], np.int64)
     count = len(indices)
     if not count:
         return Swarm()
     prototypes = instancer.GetPrototypesRel().GetForwardedTargets()
-    from_copy = _transforms(instancer, time)
+    from_copy = _transforms(instancer, time, base)
     if len(from_copy) != count:
         return Swarm(issues=("positions and protoIndices differ in length",))
-    kept = _mask(instancer, time, count)
+    kept = _mask(instancer, base, count)
     for valid, reason in (
         ((indices >= 0) & (indices < len(prototypes)), "instances have a protoIndex without prototype"),
         (np.isfinite(from_copy).all(axis=(1, 2)), "instances have a transform that is not finite"),
@@ -47,7 +48,7 @@ def read_point_instancer(prim: Usd.Prim, time: Usd.TimeCode) -> Swarm:
             issues.append(f"{lost} {reason}")
         kept &= valid
     display = read_display_of_instances(prim, time, count, issues)
-    everyone = Placement(from_copy, _ids(instancer, time, count), *display)
+    everyone = Placement(from_copy, _ids(instancer, base, count), *display)
     sorted_rows = _by_value(indices, kept)
     return Swarm(tuple((prototypes[k], _chosen(everyone, rows)) for k, rows in sorted_rows), tuple(issues))
 
@@ -59,9 +60,9 @@ def has_varying_copies(prim: Usd.Prim) -> bool:
     return any(attribute.ValueMightBeTimeVarying() for attribute in attributes)
 
 
-def _transforms(instancer: UsdGeom.PointInstancer, time: Usd.TimeCode) -> NDArray[np.float64]:
+def _transforms(instancer: UsdGeom.PointInstancer, time: Usd.TimeCode, base: Usd.TimeCode) -> NDArray[np.float64]:
     without_prototypes, unmasked = UsdGeom.PointInstancer.ExcludeProtoXform, UsdGeom.PointInstancer.IgnoreMask
-    return matrices(instancer.ComputeInstanceTransformsAtTime(time, time, without_prototypes, unmasked))
+    return matrices(instancer.ComputeInstanceTransformsAtTime(time, base, without_prototypes, unmasked))
 
 
 def _mask(instancer: UsdGeom.PointInstancer, time: Usd.TimeCode, count: int) -> NDArray[np.bool_]:

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom
+from pxr import Usd, UsdGeom, Vt
 
 from defshade_cli.usd.values import floats
 
 
-def read_positions(prim: Usd.Prim, time: Usd.TimeCode) -> NDArray[np.float32] | None:
-    """(P, 3) of a PointBased prim; None where nothing fit to draw is authored.
+def read_positions(prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode | None = None) -> NDArray[np.float32] | None:
+    """(P, 3) of a PointBased prim; None where no vectors of floats are authored, the only type that the schema has.
 
     Where velocities stand beside the points' last sample, points move on from there by them and by accelerations, as
     UsdGeomPointBased says, and are not interpolated: between samples, the number of points may change.
+    base: the time whose last sample counts, where that is another than `time`.
     """
     based = UsdGeom.PointBased(prim)
-    moved = based.ComputePointsAtTime(time, time) if is_carried_by_velocities(prim, time) else None
+    moved = based.ComputePointsAtTime(time, base or time) if is_carried_by_velocities(prim, time) else None
     value = moved if moved is not None and len(moved) else based.GetPointsAttr().Get(time)
-    return None if value is None else floats(value, 3)
+    return floats(value, 3) if isinstance(value, Vt.Vec3fArray) else None
 
 
 def is_carried_by_velocities(prim: Usd.Prim, time: Usd.TimeCode) -> bool:

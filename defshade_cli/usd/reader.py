@@ -25,6 +25,8 @@ from defshade_cli.settings import Complexity
 from defshade_cli.usd import stage as facts
 from defshade_cli.usd.camera import choose_camera, find_cameras, framed_camera, read_camera
 from defshade_cli.usd.complexity import View, choose_levels
+from defshade_cli.usd.copies import rounded
+from defshade_cli.usd.extent import extent_of
 from defshade_cli.usd.geometry import Gprim, Surface
 from defshade_cli.usd.identity import read_assets, read_labels
 from defshade_cli.usd.instancing import Piece
@@ -33,7 +35,6 @@ from defshade_cli.usd.linking import link
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.mesh_light import Glow, Glows, glowing_lights, shown_material
 from defshade_cli.usd.palette import Palette
-from defshade_cli.usd.polygons import Polygons
 from defshade_cli.usd.settings import read_settings
 from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.tessellation import Tessellation
@@ -52,7 +53,8 @@ class StageReader:
     camera: path or name; without it the rule of usd/camera.py picks.
     purposes: of the geometry that is drawn; without them those of the render settings.
     render_settings, product: paths of their prims; settings are found as usd/products.py does.
-    complexity: of subdivision surfaces; for `auto` it matters how large the image is, see scene.camera.image_size.
+    complexity: of subdivision surfaces and, where it is not `auto`, of solids as Hydra makes cages of them; for `auto`
+        it matters how large the image is, see scene.camera.image_size.
     extras: what only some layers need.
     beside: a reader of the same stage, whose memory is shared.
     Raises PrimNotFound for a camera or render settings that the stage lacks.
@@ -74,7 +76,8 @@ class StageReader:
     ) -> None:
         self._complexity, self._size, self._width = complexity, size, width
         self._extras = extras
-        self._memory: Memory = beside._memory if beside else Memory(stage, extras)
+        as_cages = complexity != "auto"
+        self._memory: Memory = beside._memory if beside else Memory(stage, extras, as_cages=as_cages)
         self._tessellation: Tessellation = beside._tessellation if beside else Tessellation()
         self._settings = read_settings(stage, render_settings, product)
         self._stage, self._purposes = stage, tuple(purposes or self._settings.purposes)
@@ -126,12 +129,14 @@ class StageReader:
 
     def _read(self, frame: float | None, time: Usd.TimeCode, levels: dict[str, int]) -> Scene:
         """levels: of refinement by path of the surface; those that are missing are chosen, and put in."""
-        traversal = Traversal(self._stage, self._memory, time, self._purposes)
+        base = time if frame is None else Usd.TimeCode(frame)
+        traversal = Traversal(self._stage, self._memory, time, self._purposes, base)
         pieces = traversal.read_stage()
-        drawn = tuple(_drawn(pieces, self._purposes))
+        placed = tuple(_surfaces(pieces, self._purposes))
+        drawn = tuple((piece, surface) for piece, surface in placed if surface.groups)
         if not drawn and not traversal.dormant:
             raise EmptyStage(_empty(self._stage, traversal.issues))
-        camera, camera_issues = self._read_camera(time, drawn)
+        camera, camera_issues = self._read_camera(time, placed)
         gprims = self._tessellate(drawn, camera, levels)
         palette = Palette(self._memory, time)
         meshes: dict[Mesh, int] = {}
@@ -175,14 +180,17 @@ class StageReader:
         return found
 
     def _read_camera(
-        self, time: Usd.TimeCode, drawn: Iterable[PlacedSurface]
+        self, time: Usd.TimeCode, placed: Iterable[PlacedSurface]
     ) -> tuple[Camera, tuple[Unsupported, ...]]:
-        """The camera; one of ours frames the surfaces as authored, however they are refined."""
+        """The camera; one of ours frames the surfaces as authored, however they are refined, empty ones too."""
         if self._camera is None:
-            placed: dict[Polygons, list[NDArray[np.float64]]] = defaultdict(list)
-            for piece, surface in drawn:
-                placed[surface.polygons].append(piece.root_from_object)
-            boxes = (world_boxes(polygons.bounds, _joined(matrices)) for polygons, matrices in placed.items())
+            standing: dict[bytes, list[NDArray[np.float64]]] = defaultdict(list)
+            for piece, surface in placed:
+                standing[extent_of(self._stage, surface, time).tobytes()].append(piece.root_from_object)
+            boxes = (
+                world_boxes(np.frombuffer(extent).reshape(2, 3), _joined(matrices))
+                for extent, matrices in standing.items()
+            )
             return framed_camera(enclose(boxes), facts.up_axis(self._stage)), ()
         camera, issues = read_camera(self._camera, time)
         return self._settings.applied_to(camera), issues
@@ -201,7 +209,7 @@ class StageReader:
         }
 
 
-def _drawn(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[PlacedSurface]:
+def _surfaces(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[PlacedSurface]:
     for piece in pieces:
         if isinstance(piece.content, Surface) and (piece.purpose or "default") in purposes:
             yield piece, piece.content
@@ -240,7 +248,7 @@ def _drawable(mesh: int, subsets: tuple[Subset, ...], pieces: Sequence[Piece], u
     color, opacity = _joined([p.display_color for p in pieces]), _joined([p.display_opacity for p in pieces])
     return Drawable(
         mesh=mesh,
-        world_from_object=_joined([piece.root_from_object for piece in pieces]),
+        world_from_object=_joined([_world_from_object(piece) for piece in pieces]),
         subsets=subsets,
         paths=tuple(path for piece in pieces for path in piece.paths),
         instance_ids=_joined([piece.ids for piece in pieces]),
@@ -251,6 +259,11 @@ def _drawable(mesh: int, subsets: tuple[Subset, ...], pieces: Sequence[Piece], u
 
 def _joined(arrays: Sequence[NDArray]) -> NDArray:
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
+
+
+def _world_from_object(piece: Piece) -> NDArray[np.float64]:
+    is_point = isinstance(piece.content, Surface) and piece.content.copies is not None
+    return rounded(piece.root_from_object) if is_point else piece.root_from_object
 
 
 def _paths(drawables: Iterable[Drawable]) -> dict[str, None]:

@@ -89,9 +89,9 @@ def stage_name(stage: Usd.Stage) -> str:
 
 
 def up_axis(stage: Usd.Stage) -> str:
-    """ "Y" or "Z"; anything else that is authored counts as USD's fallback."""
-    authored = _metadata(stage, UsdGeom.Tokens.upAxis)
-    return str(authored) if authored in ("Y", "Z") else str(UsdGeom.GetFallbackUpAxis())
+    """ "Y" or "Z"; anything else that is authored counts as Z, as it does for usdrecord's camera."""
+    authored = _metadata(stage, UsdGeom.Tokens.upAxis) or UsdGeom.GetFallbackUpAxis()
+    return "Y" if authored == UsdGeom.Tokens.y else "Z"
 
 
 def meters_per_unit(stage: Usd.Stage) -> float:

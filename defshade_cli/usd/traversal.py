@@ -34,17 +34,21 @@ _PROTOTYPE_CHILDREN = Usd.PrimIsActive & Usd.PrimIsLoaded
 class Traversal:
     """One walk at one time, in which each prototype is read once.
 
+    base: the frame that the time is of; other than `time` while a shutter is open.
     issues: what is left out, as the keys of a dictionary to keep their order.
     dormant: something is absent now, but not at all times.
     glows: what makes surfaces lights, by their paths.  portals: paths of the hints for sampling domes.
     """
 
-    def __init__(self, stage: Usd.Stage, memory: Memory, time: Usd.TimeCode, purposes: Sequence[str]) -> None:
+    def __init__(
+        self, stage: Usd.Stage, memory: Memory, time: Usd.TimeCode, purposes: Sequence[str], base: Usd.TimeCode
+    ) -> None:
         self.issues: dict[Unsupported, None] = {}
         self.dormant = False
         self.glows: dict[str, Glow] = {}
         self.portals: list[str] = []
-        self._stage, self._memory, self._time, self._purposes = stage, memory, time, purposes
+        self._stage, self._memory, self._purposes = stage, memory, purposes
+        self._time, self._base = time, base
         self._prototypes: dict[tuple[Sdf.Path, Sdf.Path | None], tuple[Piece, ...] | None] = {}
         memory.xforms.SetTime(time)
 
@@ -134,16 +138,14 @@ class Traversal:
             yield self._piece(prim, here, light)
 
     def _gprim(self, prim: Usd.Prim, here: Standing) -> Iterator[Piece]:
-        surface = self._memory.surface(prim, self._time)
+        surface = self._memory.surface_around(prim, self._time, self._base)
         if surface is None:
             self._report(prim, f"prims of type {prim.GetTypeName()} are not drawn")
             return
         if surface.groups and here.rig:
             surface, here = self._deformed(prim, surface, here, here.rig)
         self.issues.update(dict.fromkeys(surface.issues))
-        if not surface.groups:
-            self.dormant |= is_time_varying(prim)
-            return
+        self.dormant |= not surface.groups and is_time_varying(prim)
         yield self._piece(prim, here, surface, {path: self._memory.bindings(path) for path in surface.groups})
 
     def _deformed(self, prim: Usd.Prim, rest: Surface, here: Standing, rig: Rig) -> tuple[Surface, Standing]:
@@ -186,7 +188,7 @@ class Traversal:
             self._report(prim, *reasons)
 
     def _point_instances(self, prim: Usd.Prim, here: Standing) -> Iterator[Piece]:
-        swarm = read_point_instancer(prim, self._time)
+        swarm = read_point_instancer(prim, self._time, self._base)
         self._report(prim, *swarm.issues)
         self.dormant |= not swarm.placements and has_varying_copies(prim)
         for path, placement in swarm.placements:

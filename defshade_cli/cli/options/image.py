@@ -97,7 +97,8 @@ def _shading_options() -> list[Function]:
             default=_RENDER.complexity,
             default_text=str(_RENDER.complexity),
             help="Refinement of subdivision surfaces: auto goes by their size in the image; low draws their cages, "
-            "medium, high and veryhigh one, two and three levels.",
+            "medium, high and veryhigh one, two and three levels. All but auto make solids of ten segments, as "
+            "usdrecord does.",
         ),
         option(
             "--render-space",

@@ -1,0 +1,37 @@
+"""Why some references have no silhouette, or one that ours cannot agree with: what their renderer does otherwise."""
+
+from __future__ import annotations
+
+from defshade_cli.measure.conformance.catalogue import Case
+from defshade_cli.measure.conformance.results import LEAST_IOU
+
+_DISCS = "Storm draws points as discs that face the image, and cuts or clamps them as such; ours are spheres"
+_VOLUME = "volumes are reported, not drawn"
+
+_REASONS = {
+    "testUsdImagingGLPoints": _DISCS,
+    "testUsdImagingGLPoints_clipped": _DISCS,
+    "testUsdImagingGLPoints_zoom": f"{_DISCS}: no larger than GL's largest point",
+    "testUsdImagingGLPoints_zoom_pan": _DISCS,
+    "testUsdImagingGLVaryingTopology_003": _DISCS,
+    "testUsdImagingGLCurves": "at complexity 1.0 Storm draws curves as lines one pixel wide",
+    "testUsdImagingGLVdbVolumeFallbackMaterial_001": _VOLUME,
+    "testUsdImagingGLVdbVolumeFallbackMaterial_002": _VOLUME,
+    "testUsdImagingGLVdbVolumeFallbackMaterial_003": _VOLUME,
+}
+"""By the reference's name."""
+
+_STAGES = {
+    "test_1547.2/data/test.usda": "Arnold's own primvars make a light of the sphere, and hide it from the camera",
+}
+
+
+def remark_on(case: Case, iou: float | None) -> str:
+    """One sentence without a full stop; empty where nothing needs saying."""
+    if case.image is None or (iou is not None and iou >= LEAST_IOU):
+        return ""
+    if reason := _REASONS.get(case.image.stem) or _STAGES.get(case.stage_name):
+        return reason
+    if iou is not None:
+        return ""
+    return "conditions unknown: to look at" if case.maker == "viewer" else "a sky fills the background"
