@@ -7,6 +7,7 @@
 #   make tables  measure the layouts anew, for the table in docs/lighting.md
 #   make bench-reading  measure what reading a stage costs
 #   make accuracy  measure accumulated light against Mitsuba 3, into docs/accuracy.md
+#   make error-check  compare the errors that renders claim with those that they have, into docs/accuracy.md
 #   make conformance  lay stages by others beside their references, into build/conformance and docs/conformance.md
 #   make wheel   build dist/*.whl
 #   make clean   remove what was built, the virtual environment too
@@ -15,7 +16,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lint docs tables bench-reading accuracy conformance wheel clean
+.PHONY: demo test lint docs tables bench-reading accuracy error-check conformance wheel clean
 
 PYTHON ?= python3
 BIN := .venv/bin
@@ -56,6 +57,8 @@ bench-reading: .venv/.ready
 accuracy: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.accuracy docs/accuracy.md
 
+error-check: .venv/.ready-reference
+	$(BIN)/python -m defshade_cli.measure.convergence docs/accuracy.md
 conformance: .venv/.ready
 	$(BIN)/python -m defshade_cli.measure.conformance build/conformance docs/conformance.md
 

@@ -13,12 +13,14 @@ Matrices are named `b_from_a`, act on column vectors (`p_b = b_from_a @ p_a`) an
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 Matrix = NDArray[np.float64]
+Triple = tuple[float, float, float]
 Window = tuple[float, float, float, float]
 ConformPolicy = Literal["expandAperture", "cropAperture", "adjustApertureWidth", "adjustApertureHeight"]
 
@@ -85,10 +87,24 @@ def is_similarity(matrix: Matrix) -> bool:
 
 
 def frame_along(direction: NDArray) -> NDArray[np.float64]:
-    """(3, 3) a rotation whose third column points along `direction` (3,); +Z for a zero vector."""
-    z = normalize(np.asarray(direction, np.float64)) if np.any(direction) else np.array([0.0, 0.0, 1.0])
-    x = normalize(np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z))
-    return np.column_stack([x, np.cross(z, x), z])
+    """(3, 3) a rotation whose third column points along `direction` (3,); +Z for a zero vector.
+
+    In plain floats: shadow maps ask for tens of frames a sample, and NumPy takes ten times as long for three numbers.
+    """
+    z = _unit(*map(float, direction)) or (0.0, 0.0, 1.0)
+    x = _unit(*(_cross((0.0, 1.0, 0.0), z) if abs(z[1]) < 0.9 else _cross((1.0, 0.0, 0.0), z)))
+    assert x
+    return np.array([x, _cross(z, x), z]).T
+
+
+def _unit(x: float, y: float, z: float) -> Triple | None:
+    """None for a zero vector."""
+    length = math.sqrt(x * x + y * y + z * z)
+    return (x / length, y / length, z / length) if length > 0.0 else None
+
+
+def _cross(a: Triple, b: Triple) -> Triple:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def conform_window(window: Window, aspect: float, policy: ConformPolicy = "expandAperture") -> Window:

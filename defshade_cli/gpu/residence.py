@@ -28,25 +28,31 @@ INDICES_IN_POOL = 2
 _COMMAND = np.dtype([(name, "u4") for name in ("count", "instances", "first_index", "base_vertex", "base_instance")])
 
 
+_TURNS = 8
+
+
 class RecordBuffer:
     """A storage buffer of records at one binding; it grows as it must.
 
-    llvmpipe does not know which storage buffers its queued draws still read, so there a write waits for them.
+    llvmpipe does not know which storage buffers its queued draws still read, so there a write goes to the next of a
+    few, and waits for the draws once they have all been written.
     """
 
     def __init__(self, gpu: Gpu, binding: int) -> None:
         self._gpu, self._binding = gpu, binding
-        self._buffer = gpu.keep(gpu.context.buffer(reserve=256))
+        self._buffers = [gpu.keep(gpu.context.buffer(reserve=256)) for _ in range(_TURNS if gpu.is_software else 1)]
+        self._turn = 0
 
     def write(self, records: NDArray) -> None:
         """Upload `records` and bind the buffer."""
-        if self._gpu.is_software:
+        if self._gpu.is_software and self._turn == 0:
             self._gpu.context.finish()
+        buffer, self._turn = self._buffers[self._turn], (self._turn + 1) % len(self._buffers)
         data = np.ascontiguousarray(records).tobytes()
-        if len(data) > self._buffer.size:
-            self._buffer.orphan(len(data))
-        self._buffer.write(data)
-        self._buffer.bind_to_storage_buffer(self._binding)
+        if len(data) > buffer.size:
+            buffer.orphan(len(data))
+        buffer.write(data)
+        buffer.bind_to_storage_buffer(self._binding)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -38,6 +38,7 @@ up to |∂z/∂x| + |∂z/∂y| nearer. An offset along the light moves no shado
 
 _ROUNDING = 1e-5  # what float32 may move a corner, over the greatest coordinate
 _FACES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], np.float64)
+_FACE_FRAMES = tuple(frame_along(-face) for face in _FACES)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,7 +105,7 @@ def _around_receivers(position: NDArray[np.float64], extent: ShadowExtent, far: 
 def _cube(position: NDArray[np.float64], far: float) -> tuple[Camera, ...]:
     side = 1.0 + 4.0 / RESOLUTION  # room for the jitter, so that the faces still meet
     window = (-side, side, -side, side)
-    return tuple(_looking(position, face, window, (_NEAREST * far, far)) for face in _FACES)
+    return tuple(_framed(position, frame, window, (_NEAREST * far, far)) for frame in _FACE_FRAMES)
 
 
 def _opening(camera: Camera) -> float:
@@ -119,8 +120,18 @@ def _looking(
     clip: tuple[float, float],
     projection: Projection = "perspective",
 ) -> Camera:
+    return _framed(position, frame_along(-np.asarray(direction)), window, clip, projection)
+
+
+def _framed(
+    position: NDArray[np.float64],
+    rotation: NDArray[np.float64],
+    window: Window,
+    clip: tuple[float, float],
+    projection: Projection = "perspective",
+) -> Camera:
     frame: Matrix = np.eye(4)
-    frame[:3, :3] = frame_along(-np.asarray(direction))
+    frame[:3, :3] = rotation
     frame[:3, 3] = position
     return Camera("<shadow>", frame, window, projection, clip)
 
@@ -168,9 +179,9 @@ class ShadowPass:
         maps = [camera for light in cameras for camera in light]
         assert len(maps) <= CAPACITY
         self._framebuffer.use()
-        self._framebuffer.viewport = (0, 0, *self._depth.size)
-        self._framebuffer.clear(depth=0.0)
         if maps:
+            columns, rows = min(len(maps), TILES), -(-len(maps) // TILES)
+            self._framebuffer.clear(depth=0.0, viewport=(0, 0, columns * RESOLUTION, rows * RESOLUTION))
             records = np.zeros(len(maps), record("ShadowMap"))
             for tile, camera in enumerate(maps):
                 records[tile] = _map_record(camera, tile, jitter)
