@@ -106,6 +106,18 @@ def test_the_source_is_not_written_to() -> None:
     np.testing.assert_array_equal(pixels, before)
 
 
+def test_pictures_of_ids_motion_and_mattes() -> None:
+    """Equal ids have equal colours, the background none; motion is grey where there is none."""
+    ids = np.array([[[3], [3], [4], [-1]]], np.float32)
+    shown = picture(LAYERS["primId"], ids, display_transform(), alpha=True)[0]
+    assert (shown[0] == shown[1]).all() and (shown[0] != shown[2]).any() and not shown[3].any()
+    motion = np.array([[[0, 0], [4, -4], [-2, 0]]], np.float32)
+    shown = picture(LAYERS["motionForward"], motion, display_transform(), alpha=True)[0]
+    np.testing.assert_allclose(shown, [[0.5, 0.5, 0.5], [1.0, 0.0, 0.5], [0.25, 0.5, 0.5]])
+    matte = np.zeros((1, 1, 12), np.float32)
+    assert not picture(LAYERS["cryptoObject"], matte, display_transform(), alpha=True).any()
+
+
 def test_displays_and_views_are_listed() -> None:
     assert {ACES, PLAIN, "Raw"} <= set(displays()[SRGB])
     assert display_transform("Display P3 - Display").view in displays()["Display P3 - Display"]

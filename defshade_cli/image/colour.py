@@ -14,7 +14,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from defshade_cli.errors import UsageError
-from defshade_cli.image.false_colour import show_coordinates, show_ids, show_matte
+from defshade_cli.image.false_colour import show_coordinates, show_ids, show_matte, show_vectors
 from defshade_cli.image.layers import ID, SCENE_UNITS, UNIT_VECTOR, Layer
 from defshade_cli.image.ocio import displays, open_config
 from defshade_cli.image.render_space import REC709, RenderSpace
@@ -94,7 +94,8 @@ def picture(layer: Layer, pixels: Pixels, transform: DisplayTransform, *, alpha:
 
     Colours go through the display transform: with straight alpha where `alpha` keeps it, else composited on black.
     Unit vectors become (v + 1) / 2, and lengths are stretched over what is finite, the least value white. What is
-    0..1 stays, texture coordinates repeat, and ids get colours. Only EXR holds the data themselves.
+    0..1 stays, texture coordinates repeat, and ids and
+    motion get colours. Only EXR holds the data themselves.
     """
     if layer.is_color:
         return transform.apply(pixels if alpha else pixels[..., :3], straight=True)
@@ -106,6 +107,8 @@ def picture(layer: Layer, pixels: Pixels, transform: DisplayTransform, *, alpha:
         return show_ids(pixels, layer.background)
     if layer.source == "matte":
         return np.clip(show_matte(pixels), 0.0, 1.0)
+    if layer.source == "motion":
+        return show_vectors(pixels)
     return np.clip(show_coordinates(pixels) if pixels.shape[-1] == 2 else pixels, 0.0, 1.0)
 
 

@@ -30,6 +30,12 @@ def show_matte(pixels: Pixels) -> Pixels:
     return np.einsum("hwrc,hwr->hwc", colors_of_ids(ids.view(np.uint32)), coverage)
 
 
+def show_vectors(pixels: Pixels) -> Pixels:
+    """(H, W, 2) → (H, W, 3): red grows to the right and green up, grey is none; the longest reaches the end."""
+    longest = float(np.abs(pixels).max(initial=0.0)) or 1.0
+    return np.concatenate([0.5 + 0.5 * pixels / longest, np.full_like(pixels[..., :1], 0.5)], axis=-1)
+
+
 def show_coordinates(pixels: Pixels) -> Pixels:
     """(H, W, 2) → (H, W, 3): every tile of texture coordinates in red and green alike."""
     return np.concatenate([pixels % 1.0, np.zeros_like(pixels[..., :1])], axis=-1)

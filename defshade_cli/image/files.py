@@ -28,7 +28,7 @@ from defshade_cli.settings import OutputSettings
 
 def targets(layers: Iterable[str], output: OutputSettings, path: Path) -> dict[Path, tuple[str, ...]]:
     """The files that `write` makes for `path`, each with the layers in it. Raises UsageError for an unknown suffix."""
-    names, main = tuple(layers), BEAUTY
+    names, main = in_order(layers), BEAUTY
     if output.variables:
         names = tuple(v.name for v in output.variables)
         main = next((v.name for v in output.variables if v.layer == BEAUTY), names[0])
@@ -47,7 +47,7 @@ def write(film: Film, output: OutputSettings, path: Path) -> tuple[Path, ...]:
     Raises UsageError for a suffix, display or view that does not exist, OutputError for a file that cannot be
     written or does not read back as it was written; what stood at its path then still stands.
     """
-    files = targets(in_order(film.layers), output, path)
+    files = targets(film.layers, output, path)
     film = film.under(output.variables)
     for file, names in files.items():
         with _appearing_at(file) as hidden:
