@@ -90,6 +90,7 @@ class RenderSettings:
     max_error: relative standard error to render to: passes/convergence.py.
     time_limit: seconds to draw a frame in; the sample that passes them is finished.
     cryptomatte_levels: ids a pixel of a Cryptomatte holds, the greatest coverage first; even.
+    light_points: places on a light, in all samples together at least, where it looks large; 1 is its far field.
     filter: the samples of a pixel fall by it.  filter_width: pixels from end to end; None for the filter's own.
     render_space: the scene-linear colour space of the image, by a name that the OCIO config knows; None follows the
         stage's RenderSettings, then linear Rec.709.  ocio: the config, a file or ocio://NAME; empty for $OCIO's.
@@ -107,6 +108,7 @@ class RenderSettings:
     width: int | None = None
     crop: tuple[int, int, int, int] | None = None
     samples: int | None = None
+    light_points: int = 16
     max_error: float | None = None
     time_limit: float | None = None
     filter: Filter = "box"

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from defshade_cli.cli.compare import compare as command
 from defshade_cli.errors import OutputError, UsageError
 from defshade_cli.image import files, reading
 from defshade_cli.image.compare import Comparison, compare, difference
@@ -150,3 +153,32 @@ def test_flip_of_pictures_is_the_display_referred_one(tmp_path: Path) -> None:
     (result,) = compare(a, b)
     rgb = [np.ascontiguousarray(reading.read(path)["beauty"][..., :3]) for path in (b, a)]
     assert result.flip == pytest.approx(evaluator.evaluate(*rgb, "LDR", applyMagma=False)[1])
+
+
+def test_delta_e_is_that_of_the_published_pairs() -> None:
+    """Equal colours are 0 apart; greys of L* 50 and 60 are 10 / S_L apart: Sharma, Wu, Dalal 2005, L* 55."""
+
+    def grey(lightness: float) -> np.ndarray:
+        return np.full((2, 2, 3), ((lightness + 16) / 116) ** 3, np.float32)
+
+    (same,) = compare(grey(50), grey(50), flip=False, colour=True)
+    (apart,) = compare(grey(60), grey(50), flip=False, colour=True)
+    mean = 55.0
+    weight = 1 + 0.015 * (mean - 50) ** 2 / np.sqrt(20 + (mean - 50) ** 2)
+    assert same.delta_e == pytest.approx(0, abs=1e-3)
+    assert apart.delta_e == pytest.approx(10 / weight, rel=2e-3)
+
+
+def test_the_heat_map_is_black_where_nothing_differs(tmp_path: Path) -> None:
+    pytest.importorskip("flip_evaluator")
+    beauty = film("beauty")
+    other = replace(beauty, layers={"beauty": beauty.layers["beauty"].copy()})
+    other.layers["beauty"][8:16, 8:16, :3] += 1.0
+    for name, frame in (("a.exr", other), ("b.exr", beauty)):
+        files.write(frame, OutputSettings(), tmp_path / name)
+    arguments = [str(tmp_path / name) for name in ("a.exr", "b.exr")]
+    done = CliRunner().invoke(command, [*arguments, "--flip-map", str(tmp_path / "map.png"), "--delta-e", "--json"])
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.output)["layers"][0]["delta_e"] > 0
+    shown = reading.read(tmp_path / "map.png")["beauty"]
+    assert shown[12, 12].max() > 0.5 > 0.05 > shown[0, 36].max()

@@ -181,7 +181,7 @@ def pipeline(gpu: Gpu) -> Pipeline:
 def test_the_shader_reads_the_profile_as_the_reference_does(pipeline: Pipeline, options: dict) -> None:
     profile = parse_ies(ies("0 15 30 60 90 180", "0 90 180 270 360", " ".join(str(k % 24 % 13) for k in range(30))))
     plain, shaped = bulb(0.3, 0.2, 1.5), lamp(profile, 25.0, **options)
-    render = RenderSettings(size=(64, 64), shadows=False)
+    render = RenderSettings(size=(64, 64), shadows=False, light_points=1)
     images = []
     for light in (plain, shaped):
         of = scene([quad(5.0)], [light], [WHITE])

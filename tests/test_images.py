@@ -32,7 +32,7 @@ REFERENCES = ROOT / "tests" / "references"
 FAILURES = ROOT / "build" / "test-images"
 REGENERATE = "DEFSHADE_REGENERATE" in os.environ
 
-SETTINGS = RenderSettings(size=(160, 90))
+SETTINGS = RenderSettings(size=(160, 90), light_points=1)
 CASES: dict[str, tuple[str, float | None, RenderSettings]] = {
     **{path.stem: (path.stem, None, SETTINGS) for path in sorted(resources.SCENES.glob("*.usda"))},
     "animated.17": ("animated", 17.0, SETTINGS),
@@ -43,6 +43,7 @@ CASES: dict[str, tuple[str, float | None, RenderSettings]] = {
     "purposes.guide": ("purposes", None, replace(SETTINGS, purposes=("default", "proxy", "guide"))),
     "subdivision.low": ("subdivision", None, replace(SETTINGS, complexity="low")),
     "light_rect_texture.32": ("light_rect_texture", None, replace(SETTINGS, samples=32)),
+    "light_rect.points": ("light_rect", None, RenderSettings(size=(160, 90))),
     "motion_blur.16": ("motion_blur", 4.0, replace(SETTINGS, samples=16)),
     "showcase.8": ("showcase", None, replace(SETTINGS, samples=8)),
 }

@@ -31,7 +31,7 @@ def pipeline(gpu: Gpu) -> Pipeline:
 
 def render(pipeline: Pipeline, of: Scene, layout: Layout = "float", **options: object) -> NDArray[np.float64]:
     """(64, 64, 3) beauty without shadows."""
-    settings = RenderSettings(size=(64, 64), layout=layout, shadows=False, **options)  # type: ignore[arg-type]
+    settings = RenderSettings(size=(64, 64), layout=layout, shadows=False, light_points=1, **options)  # type: ignore[arg-type]
     return beauty(pipeline.render(of, make_plan(of, settings)).layers)
 
 

@@ -28,7 +28,7 @@ def pipeline(gpu: Gpu) -> Pipeline:
 
 def render(pipeline: Pipeline, of: Scene, **options: object) -> NDArray[np.float64]:
     """(64, 64) red channel."""
-    plan = make_plan(of, RenderSettings(size=(64, 64), **options))  # type: ignore[arg-type]
+    plan = make_plan(of, RenderSettings(size=(64, 64), light_points=1, **options))  # type: ignore[arg-type]
     return beauty(pipeline.render(of, plan).layers)[..., 0]
 
 

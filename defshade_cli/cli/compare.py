@@ -17,9 +17,10 @@ from defshade_cli.settings import OutputSettings
 
 if TYPE_CHECKING:
     from defshade_cli.image.compare import Comparison
+    from defshade_cli.scene.camera import Camera
 
 DIFFERENT = 1
-METRICS = ("rmse", "rel_mse", "max_error", "flip")
+METRICS = ("rmse", "rel_mse", "max_error", "flip", "delta_e")
 
 _EPILOG = epilog(
     "defshade compare after.exr before.exr",
@@ -50,6 +51,10 @@ class Excess(NamedTuple):
     help=f"The most that a metric may be in any layer, repeatable: {', '.join(METRICS)}; a bare number is for rmse.",
 )
 @click.option("--flip", is_flag=True, help="Measure FLIP too, the difference as seen: seconds a megapixel.")
+@click.option("--delta-e", is_flag=True, help="Measure CIE ΔE2000 too, the difference of colours.")
+@click.option(
+    "--flip-map", type=click.Path(path_type=Path), metavar="FILE", help="Write FLIP as a heat map, a picture."
+)
 @click.option("--diff", type=click.Path(path_type=Path), metavar="FILE", help="Write the absolute difference.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON in place of a table.")
 @click.pass_context
@@ -59,6 +64,8 @@ def compare(
     reference: Path,
     thresholds: tuple[tuple[str, float], ...],
     flip: bool,
+    delta_e: bool,
+    flip_map: Path | None,
     diff: Path | None,
     as_json: bool,
 ) -> None:
@@ -69,13 +76,16 @@ def compare(
     """
     from defshade_cli.image.compare import compare as measure
 
-    wants_flip = flip or any(metric == "flip" for metric, _ in thresholds)
-    layers = measure(image, reference, flip=wants_flip)
+    wanted = {metric for metric, _ in thresholds}
+    wants_flip = flip or flip_map is not None or "flip" in wanted
+    layers = measure(image, reference, flip=wants_flip, colour=delta_e or "delta_e" in wanted)
     if wants_flip and all(layer.flip is None for layer in layers):
         raise UsageError("FLIP is of colour layers, and needs the package flip-evaluator")
     excesses = list(_excesses(layers, thresholds))
     if diff is not None:
         _write_difference(image, reference, diff)
+    if flip_map is not None:
+        _write_flip_map(image, reference, flip_map)
     if as_json:
         record = {"layers": layers, "over": [excess._asdict() for excess in excesses]}
         click.echo(json.dumps(plain(record), indent=2, allow_nan=False))
@@ -104,15 +114,36 @@ def _write_difference(image: Path, reference: Path, path: Path) -> None:
     from defshade_cli.image.film import Film
     from defshade_cli.image.layers import BEAUTY, LAYERS
     from defshade_cli.image.reading import read
-    from defshade_cli.scene.camera import Camera
 
     first, second = read(image), read(reference)
     layers = {name: difference(first[name], second[name]) for name in LAYERS if name in first and name in second}
     if BEAUTY in layers:
         rgb = layers[BEAUTY][..., :3]
         layers[BEAUTY] = np.concatenate([rgb, np.ones_like(rgb[..., :1])], axis=-1)
-    nowhere = Camera("<difference>", np.eye(4), (-1.0, 1.0, -1.0, 1.0))
-    write(Film(layers, nowhere, path.stem), OutputSettings(full_float=True), path)
+    write(Film(layers, _nowhere(), path.stem), OutputSettings(full_float=True), path)
+
+
+def _write_flip_map(image: Path, reference: Path, path: Path) -> None:
+    """The beauty's FLIP from black over red to white: matplotlib's magma, as the authors have it."""
+    from defshade_cli.image.compare import is_picture
+    from defshade_cli.image.files import write
+    from defshade_cli.image.film import Film
+    from defshade_cli.image.layers import BEAUTY, Layer
+    from defshade_cli.image.perception import heat_map
+    from defshade_cli.image.reading import read
+
+    pixels = heat_map(read(image)[BEAUTY], read(reference)[BEAUTY], is_picture(reference))
+    row = Layer("flip", ("R", "G", "B"), "0..1", "none", "flip", 0.0, True, "FLIP as a heat map")
+    write(Film({BEAUTY: pixels}, _nowhere(), path.stem, rows={BEAUTY: row}), OutputSettings(), path)
+
+
+def _nowhere() -> Camera:
+    """The camera of a film that none has seen."""
+    import numpy as np
+
+    from defshade_cli.scene.camera import Camera
+
+    return Camera("<difference>", np.eye(4), (-1.0, 1.0, -1.0, 1.0))
 
 
 def _show(layers: Sequence[Comparison], excesses: Sequence[Excess]) -> None:

@@ -4,23 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from importlib.util import find_spec
-from math import inf, log2, log10, sqrt
+from math import inf, log10, sqrt
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.errors import UsageError
-from defshade_cli.image.colour import BRIGHTEST, Pixels
+from defshade_cli.image.colour import Pixels
 from defshade_cli.image.layers import BEAUTY, LAYERS
+from defshade_cli.image.perception import delta_e, flip_map
 from defshade_cli.image.reading import read
 
 Image = Path | NDArray | Mapping[str, NDArray]
 """A file, the pixels (H, W, C) of a beauty, or layers by name."""
 
 REL_MSE_EPSILON = 1e-2
-REC709_LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +33,7 @@ class Comparison:
     psnr: 20 log10(peak / rmse) in dB, the peak being 1 or b's largest magnitude if greater; inf for equal images.
     flip: mean FLIP error (Andersson et al. 2020; HDR-FLIP 2021) of a colour layer; None for data, on request, and
         where the package flip-evaluator is missing.
+    delta_e: mean CIE ΔE2000 of a colour layer, on request.
     nonfinite: pixels of a and of b with a NaN or an infinity.
     unmatched: pixels whose NaN or infinity the other image does not share. They are in none of the errors.
     """
@@ -44,6 +44,7 @@ class Comparison:
     max_error: float
     psnr: float
     flip: float | None
+    delta_e: float | None
     pixels: int
     nonfinite: tuple[int, int]
     unmatched: int
@@ -53,23 +54,39 @@ class Comparison:
         return self.unmatched == 0 and self.rmse <= threshold
 
 
-def compare(a: Image, b: Image, layers: Iterable[str] | None = None, *, flip: bool = True) -> tuple[Comparison, ...]:
+def compare(
+    a: Image, b: Image, layers: Iterable[str] | None = None, *, flip: bool = True, colour: bool = False
+) -> tuple[Comparison, ...]:
     """Compare a with the reference b over `layers`, or over those that both have.
 
     flip: also HDR-FLIP for scene-linear images (seconds a megapixel), or LDR-FLIP for pictures, by b's suffix.
+    colour: also ΔE2000, likewise.
     Raises UsageError where a layer is missing or sizes differ, OutputError for a file that cannot be read.
     """
     first, second = _layers_of(a), _layers_of(b)
-    display_referred = isinstance(b, Path) and b.suffix.lower() != ".exr"
+    display_referred = is_picture(b)
     names = tuple(layers) if layers is not None else tuple(name for name in second if name in first)
     if not names:
         raise UsageError(f"no layer in common: {', '.join(first)} against {', '.join(second)}")
     results = []
     for name in names:
         pair = _paired(name, first, second)
-        wants_flip = flip and _has_color(name) and pair[0].shape[-1] >= 3
-        results.append(_compare(name, *pair, _flip(*pair, display_referred) if wants_flip else None))
+        seen = _has_color(name) and pair[0].shape[-1] >= 3
+        seen_errors = (
+            _mean(flip_map(*pair, display_referred)) if flip and seen else None,
+            _mean(delta_e(*pair, display_referred)) if colour and seen else None,
+        )
+        results.append(_compare(name, *pair, *seen_errors))
     return tuple(results)
+
+
+def is_picture(image: Image) -> bool:
+    """A file that is display-encoded; all else is scene-linear."""
+    return isinstance(image, Path) and image.suffix.lower() != ".exr"
+
+
+def _mean(values: NDArray | None) -> float | None:
+    return None if values is None else float(values.mean())
 
 
 def difference(a: NDArray, b: NDArray) -> Pixels:
@@ -101,7 +118,7 @@ def _paired(name: str, first: Mapping[str, NDArray], second: Mapping[str, NDArra
     return a[..., :channels], b[..., :channels]
 
 
-def _compare(name: str, a: NDArray, b: NDArray, flip: float | None) -> Comparison:
+def _compare(name: str, a: NDArray, b: NDArray, flip: float | None, delta_e: float | None) -> Comparison:
     apart = difference(a, b)
     odd_a, odd_b = ~np.isfinite(a), ~np.isfinite(b)
     both = ~(odd_a | odd_b)
@@ -116,6 +133,7 @@ def _compare(name: str, a: NDArray, b: NDArray, flip: float | None) -> Compariso
         max_error=float(errors.max(initial=0.0)),
         psnr=20.0 * log10(peak / rmse) if rmse > 0 else inf,
         flip=flip,
+        delta_e=delta_e,
         pixels=a.shape[0] * a.shape[1],
         nonfinite=(int(odd_a.any(axis=-1).sum()), int(odd_b.any(axis=-1).sum())),
         unmatched=int(np.isinf(apart).any(axis=-1).sum()),
@@ -124,32 +142,3 @@ def _compare(name: str, a: NDArray, b: NDArray, flip: float | None) -> Compariso
 
 def _has_color(name: str) -> bool:
     return name not in LAYERS or LAYERS[name].is_color
-
-
-def _flip(a: NDArray, b: NDArray, display_referred: bool) -> float | None:
-    """Mean FLIP of RGB, clamped to what it is defined for: [0, 1] in pictures, ≥ 0 in scene-linear images."""
-    if find_spec("flip_evaluator") is None:
-        return None
-    import flip_evaluator
-
-    brightest = 1.0 if display_referred else BRIGHTEST
-    test, reference = (np.nan_to_num(rgb[..., :3]).clip(0.0, brightest) for rgb in (a, b))
-    parameters = {} if display_referred else _exposures(reference)
-    mode = "LDR" if display_referred else "HDR"
-    return float(flip_evaluator.evaluate(reference, test, mode, applyMagma=False, parameters=parameters)[1])
-
-
-def _exposures(reference: NDArray) -> dict[str, float]:
-    """HDR-FLIP's range of exposures in stops, the median taken over lit pixels.
-
-    The evaluator's own median is 0 where a black background fills half the image, and it then ends the process.
-    x is where its tone curve, Narkowicz's ACES fit of 0.6 x, passes 0.85 (Andersson et al. 2021, section 4):
-    0.85 = x(2.51x + 0.03) / (x(2.43x + 0.59) + 0.14).
-    """
-    luminance = reference @ np.array(REC709_LUMINANCE)
-    lit = luminance[luminance > 0]
-    if not lit.size:
-        return {"startExposure": 0.0, "stopExposure": 0.0}
-    x = max(np.roots([2.51 - 0.85 * 2.43, 0.03 - 0.85 * 0.59, -0.85 * 0.14])) / 0.6
-    start, stop = log2(x / lit.max()), log2(x / np.median(lit))
-    return {"startExposure": start, "stopExposure": stop}

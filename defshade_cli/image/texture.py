@@ -19,7 +19,8 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from defshade_cli.scene.texture import ColorSpace, ImageFile, Wrap
+from defshade_cli.image.render_space import LINEAR_REC709
+from defshade_cli.scene.texture import STATED_SPACES, ColorSpace, ImageFile, Wrap
 
 log = logging.getLogger("defshade")
 
@@ -115,9 +116,22 @@ def _read_image(source: Source, header: _Header, side: int) -> TexelImage:
         log.info("texture %s: reduced to %d texels a side", source.file.path, side)
         pixels = _reduced(pixels, side)
     texels = _four_channels(pixels) if colored or header.channels == 2 or srgb else pixels
-    if not header.eight_bit:
+    eight_bit = header.eight_bit
+    if source.color_space not in STATED_SPACES:
+        texels, eight_bit = _in_rec709(texels, source), False
+    if not eight_bit:
         texels = _half(_linear(texels) if srgb else texels)
-    return TexelImage(np.ascontiguousarray(texels[::-1]), srgb and header.eight_bit, header.wrap)
+    return TexelImage(np.ascontiguousarray(texels[::-1]), srgb and eight_bit, header.wrap)
+
+
+def _in_rec709(texels: NDArray, source: Source) -> NDArray[np.float32]:
+    """Colours of any space that the built-in OCIO config knows. Raises OSError for one that it does not."""
+    scale = 255.0 if texels.dtype == np.uint8 else 1.0
+    buffer = oiio.ImageBuf(np.ascontiguousarray(_four_channels(texels) / scale, np.float32))
+    moved = oiio.ImageBufAlgo.colorconvert(buffer, source.color_space, LINEAR_REC709, unpremult=False)
+    if moved.has_error:
+        raise OSError(f"colour space {source.color_space}: {moved.geterror()}")
+    return np.asarray(moved.get_pixels(oiio.FLOAT))
 
 
 def _reduced(pixels: NDArray, side: int) -> NDArray:

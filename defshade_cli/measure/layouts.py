@@ -79,7 +79,7 @@ def main(page: Path) -> None:
     stages = referenced_stages()
     with Gpu() as gpu:
         pipeline = Pipeline(gpu)
-        settings = RenderSettings(size=SIZE, shadows=False)
+        settings = RenderSettings(size=SIZE, shadows=False, light_points=1)
         errors = {path.stem: layout_errors(pipeline, first_frame(path), settings) for path in stages}
     page.write_text(replace_generated(page.read_text("utf-8"), "layouts", layout_table(errors)), "utf-8")
 

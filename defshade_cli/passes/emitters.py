@@ -58,11 +58,14 @@ def _emitters(number: int, planned: PlannedLight, plan: Plan, sample: Sample, ex
             return []
         places = (sample.on_light(number, k, DOME_DIRECTIONS) for k in range(DOME_DIRECTIONS))
         return [sky_emitter(light, sky_of(light), u[:2], 1.0 / DOME_DIRECTIONS) for u in places]
-    if plan.samples == 1:
+    if plan.samples * planned.points == 1:
         return [far_field(light)]
     towards = extent.receivers.mean(axis=0) + plan.camera.position
-    emitter = emitter_at(light, sample.on_light(number), towards, inside=planned.is_empty)
-    return [emitter.shared_by(plan.samples)]
+    points = [
+        emitter_at(light, sample.on_light(number, k, planned.points), towards, inside=planned.is_empty)
+        for k in range(planned.points)
+    ]
+    return [point.one_of(planned.points).shared_by(plan.samples) for point in points]
 
 
 def shadow_extent(bounds: NDArray[np.float64], plan: Plan) -> ShadowExtent:
@@ -91,7 +94,9 @@ def _corners(box: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _lit_sample(planned: PlannedLight, emitter: Emitter, plan: Plan, extent: ShadowExtent) -> LitSample:
     light = planned.light
-    within_itself = isinstance(light, MeshLight) and plan.samples == 1  # its far field shines from amid its own surface
+    within_itself = (
+        isinstance(light, MeshLight) and plan.samples * planned.points == 1
+    )  # its far field shines from amid its own surface
     if not (plan.shadows and light.casts_shadow) or within_itself:
         return LitSample(planned, emitter, ())
     relative = emitter.relative_to(plan.camera.position)

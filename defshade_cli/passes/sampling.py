@@ -16,6 +16,7 @@ Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 
 _MASK = 0xFFFFFFFF
+_GOLDEN, _ROOT_3 = 0.6180339887498949, 0.7320508075688772
 _PIXEL, _TEXEL, _LENS, _LIGHTS = range(4)
 
 
@@ -38,7 +39,7 @@ class Sample:
 
     def on_light(self, number: int, k: int = 0, of: int = 1) -> Triple:
         """The k-th of some places on the number-th light; lights with a surface take the first two coordinates."""
-        return owen_sobol_3d(self.index * of + k, _LIGHTS + number)
+        return lattice(k, of) if self is CENTRE else owen_sobol_3d(self.index * of + k, _LIGHTS + number)
 
 
 CENTRE = Sample(0, (0.5, 0.5), (0.5, 0.5), (0.5, 0.5))
@@ -53,6 +54,14 @@ def samples(count: int, kind: Filter = "box", width: float = 1.0) -> Iterator[Sa
     for i in range(count):
         dx, dy = filter_offset(kind, width, owen_sobol(i, _PIXEL))
         yield Sample(i, (0.5 + dx, 0.5 + dy), owen_sobol(i, _TEXEL), owen_sobol(i, _LENS))
+
+
+def lattice(k: int, count: int) -> Triple:
+    """The k-th of `count` points as even as few can be: Fibonacci's lattice, and multiples of √3 for depth.
+
+    On a disk's polar coordinates this is the spiral of a sunflower (Vogel 1979).
+    """
+    return (k + 0.5) / count, (0.5 + k * _GOLDEN) % 1.0, (0.5 + k * _ROOT_3) % 1.0
 
 
 def owen_sobol(index: int, pattern: int) -> Pair:

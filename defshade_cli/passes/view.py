@@ -32,6 +32,7 @@ def view_record(plan: Plan, layout: Layout, sample: Sample = CENTRE) -> NDArray:
     view["size"] = plan.size
     view["exposure"] = plan.exposure
     view["sample_index"] = sample.index
+    view["pixel_share"] = 1.0 / plan.samples if plan.samples > 1 else 0.0
     return view
 
 

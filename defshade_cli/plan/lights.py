@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from defshade_cli.image.light_texture import with_texture
 from defshade_cli.plan.groups import group_lights, light_groups, light_outputs
 from defshade_cli.plan.overlap import reaches_into_ball
+from defshade_cli.plan.points import apparent_size, share_points
 from defshade_cli.scene.light import DistantLight, Light, SphereLight
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
@@ -40,6 +41,7 @@ class PlannedLight:
     reach: radius of the volume in scene units, infinite for a quad.
     is_empty: no geometry lies within a sphere light.
     groups: the layers that sum it.
+    points: that stand for the light in each sample; 1 is its far field where there is a single sample.
     """
 
     light: Light
@@ -48,6 +50,7 @@ class PlannedLight:
     number: int = 0
     is_empty: bool = True
     groups: tuple[str, ...] = ()
+    points: int = 1
 
 
 def volume_of(light: Light) -> Volume:
@@ -66,11 +69,18 @@ def plan_lights(
     gain = exposure * response * max(len(lit), 1) / settings.light_tolerance
     order: dict[str, int] = {"quad": 0, "sphere": 1, "cone": 2}
     groups = group_lights([light for _, light in lit], light_groups(layers), light_outputs(layers))
+    points = share_points([apparent_size(light, scene.bounds) for _, light in lit], settings)
     planned = [
         PlannedLight(
-            light, volume_of(light), _reach(light, scene.bounds, gain), number, _is_empty(light, scene), of_light
+            light=light,
+            volume=volume_of(light),
+            reach=_reach(light, scene.bounds, gain),
+            number=number,
+            is_empty=_is_empty(light, scene),
+            groups=of_light,
+            points=count,
         )
-        for (number, light), of_light in zip(lit, groups, strict=True)
+        for (number, light), of_light, count in zip(lit, groups, points, strict=True)
     ]
     return tuple(sorted(planned, key=lambda p: (order[p.volume], p.groups)))
 

@@ -59,6 +59,10 @@ class Emitter:
         """One of `samples` points that stand for the light together."""
         return replace(self, extent=self.extent / samples)
 
+    def one_of(self, points: int) -> Emitter:
+        """One of `points` that shine in the same sample."""
+        return replace(self, intensity=self.intensity / points, extent=self.extent / points)
+
     def relative_to(self, origin: Vector) -> Emitter:
         """The same with positions counted from `origin`."""
         return replace(self, position=self.position - origin)
@@ -173,7 +177,7 @@ def _cardioid(u: float) -> tuple[float, float]:
         turn = 0.5 * (low + high)
         below = turn + math.sin(math.tau * turn) / math.tau + 0.5 < u
         low, high = (turn, high) if below else (low, turn)
-    return turn, 1.0 + math.cos(math.tau * turn)
+    return turn, max(1.0 + math.cos(math.tau * turn), 1e-9)
 
 
 def _circle(turn: float, radius: float) -> tuple[float, float]:

@@ -123,6 +123,11 @@ class Light(ABC):
         return np.column_stack([x, np.cross(z, x) * (-1.0 if np.dot(np.cross(z, x), y) < 0.0 else 1.0), z])
 
     @property
+    def spread(self) -> float:
+        """How far points of the light lie from `position`, in the world; the sine of half a distant light's angle."""
+        return 0.0
+
+    @property
     def emission(self) -> NDArray[np.float64]:
         """(3,) color · intensity · 2^exposure, before normalisation by size; nits."""
         return self.color * (self.intensity * math.exp2(self.exposure))
@@ -165,6 +170,10 @@ class DistantLight(Light):
         return math.pi * (squared if half <= math.pi / 2 else 2.0 - squared)
 
     @property
+    def spread(self) -> float:
+        return math.sin(min(math.radians(self.angle) / 2, math.pi / 2))
+
+    @property
     def irradiance(self) -> NDArray[np.float64]:
         """(3,) lux on a surface that faces the light."""
         return self.emission * self.power_scale
@@ -198,6 +207,10 @@ class SphereLight(Light):
     kind = "sphere"
 
     @property
+    def spread(self) -> float:
+        return 0.0 if self.treat_as_point else self.world_radius
+
+    @property
     def world_radius(self) -> float:
         """The greatest, where the transform makes an ellipsoid of the sphere."""
         return self.radius * float(np.linalg.norm(self.world_from_light[:3, :3], ord=2))
@@ -218,6 +231,10 @@ class DiskLight(Light):
     radius: float = 0.5
     kind = "disk"
     profile = "cosine"
+
+    @property
+    def spread(self) -> float:
+        return self.radius * float(np.linalg.norm(self.world_from_light[:3, :2], ord=2))
 
     @property
     def size_factor(self) -> float:
@@ -245,6 +262,11 @@ class RectLight(Light):
         return even * self.radiance_map.mean if self.radiance_map else even
 
     @property
+    def spread(self) -> float:
+        x, y = self.world_from_light[:3, 0] * self.width, self.world_from_light[:3, 1] * self.height
+        return 0.5 * float(max(np.linalg.norm(x + y), np.linalg.norm(x - y)))
+
+    @property
     def size_factor(self) -> float:
         x, y = self.world_from_light[:3, 0], self.world_from_light[:3, 1]
         return self.width * self.height * float(np.linalg.norm(np.cross(x, y)))
@@ -258,6 +280,11 @@ class CylinderLight(Light):
     length: float = 1.0
     kind = "cylinder"
     profile = "sine"
+
+    @property
+    def spread(self) -> float:
+        scale_x, *across = np.linalg.norm(self.world_from_light[:3, :3], axis=0)
+        return float(np.hypot(0.5 * self.length * scale_x, self.radius * max(across)))
 
     @property
     def size_factor(self) -> float:

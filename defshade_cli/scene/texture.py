@@ -5,7 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-ColorSpace = Literal["auto", "sRGB", "raw"]
+ColorSpace = str
+"""auto, sRGB, raw, or a colour space by its Color Interop ID, such as lin_ap1_scene."""
+
+STATED_SPACES = ("auto", "sRGB", "raw")
+"""What a UsdUVTexture may say."""
+
 Wrap = Literal["black", "clamp", "repeat", "mirror", "useMetadata"]
 Channel = Literal["r", "g", "b", "a", "rgb"]
 Four = tuple[float, float, float, float]

@@ -27,6 +27,7 @@ from defshade_cli.scene.light import (
 )
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.scene.shadow import ShadowStyle
+from defshade_cli.usd.color_space import in_rec709
 from defshade_cli.usd.dome import is_dome, pole, sky_texture
 from defshade_cli.usd.light_files import with_files
 from defshade_cli.usd.mesh_light import Glow, is_mesh_light, read_glow
@@ -105,7 +106,7 @@ def temperature_color(kelvin: float) -> NDArray[np.float64]:
 
 
 def _common(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any]:
-    color = np.array(_input(prim, "color", time), np.float64)
+    color = np.array(in_rec709(prim.GetAttribute("inputs:color"), _input(prim, "color", time)), np.float64)
     if _input(prim, "enableColorTemperature", time):
         color = color * temperature_color(_input(prim, "colorTemperature", time))
     has_shadow = prim.HasAPI(UsdLux.ShadowAPI)

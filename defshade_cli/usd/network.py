@@ -6,6 +6,8 @@ from typing import Any
 
 from pxr import Usd, UsdShade
 
+from defshade_cli.usd.color_space import in_rec709, is_color
+
 
 class Network:
     """Reads shader nodes at one time. time_varying: some value that was read differs over time."""
@@ -21,9 +23,10 @@ class Network:
         return default if value is None else value
 
     def of(self, attribute: Usd.Attribute) -> Any:
-        """The value of an attribute that holds one."""
+        """The value of an attribute that holds one; a colour in linear Rec.709."""
         self.time_varying |= attribute.ValueMightBeTimeVarying()
-        return attribute.Get(self.time)
+        value = attribute.Get(self.time)
+        return in_rec709(attribute, value) if is_color(attribute) else value
 
     def source(self, node: UsdShade.Shader, name: str) -> Usd.Attribute | None:
         """The attribute that an input's value comes from: an input somewhere, or the output of another node."""

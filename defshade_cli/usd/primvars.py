@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom
 
+from defshade_cli.usd.color_space import in_rec709, is_color
 from defshade_cli.usd.polygons import Interpolation, Polygons, Primvar
 from defshade_cli.usd.values import floats, integers
 
@@ -56,7 +57,9 @@ def authored(primvar: UsdGeom.Primvar | None, time: Usd.TimeCode) -> Authored | 
     if not primvar or not primvar.HasValue():
         return None
     indices = primvar.GetIndices(time) if primvar.IsIndexed() else None
-    return Authored(str(primvar.GetName()), primvar.Get(time), primvar.GetInterpolation(), indices)
+    attribute, value = primvar.GetAttr(), primvar.Get(time)
+    colors = in_rec709(attribute, value) if is_color(attribute) else value
+    return Authored(str(primvar.GetName()), colors, primvar.GetInterpolation(), indices)
 
 
 def find_display(prim: Usd.Prim, name: str) -> UsdGeom.Primvar:

@@ -11,6 +11,7 @@ from pxr import Ar, Sdf, Usd, UsdShade
 from defshade_cli.scene.texture import (
     FIRST_UDIM,
     IDENTITY,
+    STATED_SPACES,
     Affine,
     Channel,
     ColorSpace,
@@ -20,6 +21,7 @@ from defshade_cli.scene.texture import (
     TextureInput,
     Wrap,
 )
+from defshade_cli.usd.color_space import texture_space
 from defshade_cli.usd.network import Network, computed, node_of
 
 _READERS = ("UsdPrimvarReader_float2", "UsdPrimvarReader_float3", "UsdPrimvarReader_float4")
@@ -42,7 +44,7 @@ def read_texture_input(network: Network, output: Usd.Attribute) -> TextureInput:
     texture = Texture(
         tiles=image_tiles(asset, attribute),
         udim=UsdShade.UdimUtils.IsUdimIdentifier(asset.path),
-        color_space=_one_of(network.value(node, "sourceColorSpace"), get_args(ColorSpace), "auto"),
+        color_space=_space(network, node, attribute),
         wrap_s=_one_of(network.value(node, "wrapS"), get_args(Wrap), "useMetadata"),
         wrap_t=_one_of(network.value(node, "wrapT"), get_args(Wrap), "useMetadata"),
     )
@@ -55,6 +57,12 @@ def read_texture_input(network: Network, output: Usd.Attribute) -> TextureInput:
         uv=uv,
         texture_from_uv=texture_from_uv,
     )
+
+
+def _space(network: Network, node: UsdShade.Shader, file: Usd.Attribute) -> ColorSpace:
+    """As the node says; where it leaves it open, as the file's attribute does."""
+    said = _one_of(network.value(node, "sourceColorSpace"), STATED_SPACES, "auto")
+    return texture_space(file) if said == "auto" else said
 
 
 def _of_channel(channel: Channel, value: Any) -> Four:

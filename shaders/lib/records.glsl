@@ -8,6 +8,7 @@ struct View {
     vec2 size;                 // pixels
     float exposure;
     uint sample_index;
+    float pixel_share;         // of a pixel, that a sample stands for; 0 in a frame of one sample
 };
 
 struct Instance {

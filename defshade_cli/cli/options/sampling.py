@@ -24,8 +24,17 @@ def sampling_options() -> list[Function]:
             type=click.IntRange(min=1),
             default_text=f"1, and {settings.MOST_SAMPLES} with --max-error or --time-limit",
             metavar="N",
-            help="Samples a pixel of the beauty: places in the pixel, on the lens and on every light. One sample takes "
-            "lights for points. Data layers are one sample at the pixel's centre.",
+            help="Samples a pixel of the beauty: places in the pixel, on the lens and on every light. "
+            "Data layers are one sample at the pixel's centre.",
+        ),
+        option(
+            "--light-points",
+            type=click.IntRange(min=1),
+            default=_RENDER.light_points,
+            default_text=str(_RENDER.light_points),
+            metavar="N",
+            help="Points that large lights get where there are fewer samples, each with a shadow map; they share them. "
+            "1 takes every light for a point.",
         ),
         option(
             "--max-error",

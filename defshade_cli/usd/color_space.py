@@ -1,0 +1,53 @@
+"""The colour spaces that attributes are authored in: metadata, ColorSpaceAPI, and what a stage declares.
+
+A Scene is in linear Rec.709; values without a space are in it already, as in UsdPreviewSurface's and UsdLux's texts.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Usd, Vt
+
+from defshade_cli.scene.texture import ColorSpace
+
+_REC709 = Gf.ColorSpace(Gf.ColorSpaceNames.LinearRec709)
+_SRGB = Gf.ColorSpace(Gf.ColorSpaceNames.SRGBRec709)
+
+
+def is_color(attribute: Usd.Attribute) -> bool:
+    return attribute.GetRoleName() == "Color"
+
+
+def in_rec709(attribute: Usd.Attribute, value: Any) -> Any:
+    """A colour that `attribute` holds, or an array of them, in linear Rec.709; as it is where it is in that already."""
+    space = _space_of(attribute)
+    if space is None or value is None:
+        return value
+    colors = np.array(value, np.float32)
+    span = Vt.FloatArray.FromNumpy(np.ascontiguousarray(colors[..., :3]).ravel())
+    space.ConvertRGBSpan(_REC709, span)
+    colors[..., :3] = np.asarray(span).reshape(*colors.shape[:-1], 3)
+    return colors
+
+
+def texture_space(attribute: Usd.Attribute) -> ColorSpace:
+    """What an image file's attribute says of its texels; `auto` where it says nothing."""
+    space = _space_of(attribute)
+    if space is None:
+        return "raw" if _name_of(attribute) else "auto"
+    return "sRGB" if space == _SRGB else str(space.GetName())
+
+
+def _name_of(attribute: Usd.Attribute) -> str:
+    return str(Usd.ColorSpaceAPI.ComputeColorSpaceName(attribute, None))
+
+
+def _space_of(attribute: Usd.Attribute) -> Gf.ColorSpace | None:
+    """None for linear Rec.709, for data, and for a name that USD does not know."""
+    name = _name_of(attribute)
+    if not name or not Gf.ColorSpace.IsValid(name):
+        return None
+    space = Gf.ColorSpace(name)
+    return None if space == _REC709 or space.IsData() else space
