@@ -59,6 +59,7 @@ accuracy: .venv/.ready-reference
 
 error-check: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.convergence docs/accuracy.md
+
 conformance: .venv/.ready
 	$(BIN)/python -m defshade_cli.measure.conformance build/conformance docs/conformance.md
 

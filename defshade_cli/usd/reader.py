@@ -80,7 +80,7 @@ class StageReader:
         self._memory: Memory = beside._memory if beside else Memory(stage, extras, as_cages=as_cages)
         self._tessellation: Tessellation = beside._tessellation if beside else Tessellation()
         self._settings = read_settings(stage, render_settings, product)
-        self._stage, self._purposes = stage, tuple(purposes or self._settings.purposes)
+        self._stage, self._purposes = stage, tuple(self._settings.purposes if purposes is None else purposes)
         self._levels: dict[str, int] = {}
         self._lights: dict[str, Light] = {}
         self._cameras = find_cameras(stage)
