@@ -10,17 +10,40 @@ uniform uint first_link;
 #endif
 
 uniform vec2 response;             // of the diffuse and of the specular lobe
+#ifdef OCCLUSION
+uniform sampler2D sky_visibility;  // what reached sharp lobes so far, what was sent, and the number of directions
+uniform sampler2D sky_visibility_before; // the same without this sample
+#endif
 
 // The part of a lobe that this pass shows: all of it in a single sample, else what sampled directions would miss.
 float share(float roughness) {
 #ifdef ANALYTIC
     return 1.0;
 #else
-    return sharpness(roughness);
+    return sharpness(roughness, view.pixel_share);
 #endif
 }
 
-// A lobe's mirror image of the sky, as blurred as the lobe is wide. No shadows.
+#ifdef OCCLUSION
+// How much of a sharp lobe the geometry leaves open as far as is known, times the directions that know it.
+float known_openness(vec3 known) {
+    return known.y > 0.0 ? known.z * known.x / known.y : known.z;
+}
+#endif
+
+// The same of one sample, with what it teaches of those before: the mean over samples is what all directions know.
+float openness() {
+#ifdef OCCLUSION
+    vec3 known = texelFetch(sky_visibility, ivec2(gl_FragCoord.xy), 0).xyz;
+    vec3 before = texelFetch(sky_visibility_before, ivec2(gl_FragCoord.xy), 0).xyz;
+    if (known.z == before.z) return 1.0;
+    return (known_openness(known) - known_openness(before)) / (known.z - before.z);
+#else
+    return 1.0;
+#endif
+}
+
+// A lobe's mirror image of the sky, as blurred as the lobe is wide.
 vec3 mirrored_sky(vec3 n, vec3 v, float roughness) {
     return share(roughness) * response.y * sky_radiance(reflect(-v, n), lobe_lod(GGX_alpha(roughness)));
 }
@@ -43,7 +66,7 @@ vec3 reflected_sky(Surface s, vec3 v, out vec3 diffuse) {
     diffuse *= 1.0 - coat;
     specular = specular * (1.0 - coat) + coat * mirrored_sky(s.normal, v, s.clearcoat_roughness);
 #endif
-    return diffuse + specular;
+    return diffuse + openness() * specular;
 }
 
 void main() {

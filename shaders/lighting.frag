@@ -9,12 +9,6 @@
 #include "generated/planes.glsl"
 #include "generated/outputs.glsl"
 
-// A lobe that is wider by the patch of light that one point stands for.
-float widened_roughness(float roughness, float alpha_squared) {
-    float alpha = GGX_alpha(roughness);
-    return sqrt(min(sqrt(alpha * alpha + alpha_squared), 1.0));
-}
-
 // How much alpha² grows where a sample stands for its share of a pixel in which the normal turns: Tokuyoshi & Kaplanyan
 // 2019, "Improved Geometric Specular Antialiasing", 2 sigma² = 1 / pi and at most 0.18. Shares shrink with the number of
 // samples, so the mean still converges; without, single samples would hit highlights that are smaller than a pixel.
@@ -37,9 +31,9 @@ vec3 lobe_response(Light light, Surface s) {
     vec3 response = light.response.xyy;
     if (light.is_sky == 0u) return response;
 #ifdef PLANE_CLEARCOAT
-    response.z *= 1.0 - sharpness(s.clearcoat_roughness);
+    response.z *= 1.0 - sharpness(s.clearcoat_roughness, view.pixel_share);
 #endif
-    response.y *= 1.0 - sharpness(s.roughness);
+    response.y *= 1.0 - sharpness(s.roughness, view.pixel_share);
     return response;
 }
 
@@ -70,12 +64,13 @@ void main() {
 #else
     irradiance *= lit.visible;
 #endif
+    vec3 response = lobe_response(lights[light_index], surface);
     float widening = patch_alpha_squared(lights[light_index], position, l) + pixel_alpha_squared(surface, pixel);
     if (widening > 0.0) {
         surface.roughness = widened_roughness(surface.roughness, widening);
         surface.clearcoat_roughness = widened_roughness(surface.clearcoat_roughness, widening);
     }
-    vec3 v = direction_to_eye(position), response = lobe_response(lights[light_index], surface);
+    vec3 v = direction_to_eye(position);
     vec3 arriving = view.exposure * render_from_rec709(irradiance);
     lit.radiance = arriving * evaluate_brdf(surface, v, l, response);
 #ifdef SPLIT

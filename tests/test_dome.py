@@ -133,3 +133,23 @@ def test_domes_are_read_with_their_image_and_pole(tmp_path: Path) -> None:
     np.testing.assert_allclose(lights["/New"].world_from_light @ [0, 1, 0, 0], [0, 0, 1, 0])
     np.testing.assert_allclose(lights["/New"].world_from_light @ [0, 0, 1, 0], [0, -1, 0, 0])
     assert any("nowhere.exr is not found" in issue.reason for issue in read.unsupported)
+
+
+def test_samples_hide_the_sky_from_a_mirror(pipeline: Pipeline) -> None:
+    """A polished floor that sees nothing but a lid: one sample shows the sky, directions learn that it is hidden."""
+    of = scene([quad(9.0), quad(9.0, 1.0)], [dome()], [MIRROR], camera(0.9))
+    assert render(pipeline, of)[..., :3].mean() > 0.9
+    assert render(pipeline, of, samples=16)[..., :3].mean() < 0.05
+    assert render(pipeline, of, samples=16, shadows=False)[..., :3].mean() > 0.9
+
+
+@pytest.mark.parametrize("roughness", [0.1, 0.25])
+def test_lobes_of_any_width_give_the_sky_back(pipeline: Pipeline, roughness: float) -> None:
+    """What a lobe does not show as an image comes from directions: together they are the metal's albedo, 5 % by chance.
+
+    The inner part of a ball, which nothing hides.
+    """
+    metal = Material("/metal", diffuse_color=(1, 1, 1), metallic=1.0, roughness=roughness)
+    of = scene([sphere()], [dome()], [metal])
+    one, many = (render(pipeline, of, samples=n)[12:20, 12:20, :3].mean() for n in (1, 64))
+    np.testing.assert_allclose(many, one, rtol=0.05)

@@ -17,7 +17,7 @@ def gradient_sky(height: int = 64) -> Environment:
 def drawn(sky: Environment, count: int = 64) -> tuple[np.ndarray, np.ndarray]:
     grid = (np.arange(count) + 0.5) / count
     pairs = [sky.sample((u, v)) for u in grid for v in grid]
-    return np.array([d for d, _ in pairs]), np.array([w for _, w in pairs])
+    return np.array([d for d, *_ in pairs]), np.array([w for _, w, _ in pairs])
 
 
 @pytest.mark.parametrize("sky", [uniform_environment(), gradient_sky(), gradient_sky(300)])

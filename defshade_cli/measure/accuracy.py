@@ -59,7 +59,7 @@ def measure(
     pipeline: Pipeline, scene: Scene, size: tuple[int, int], samples: Iterable[int], reference_samples: int
 ) -> Accuracy:
     """Render `scene` with each number of samples and compare with a path-traced reference."""
-    plans = {n: make_plan(scene, RenderSettings(size=size, samples=n)) for n in samples}
+    plans = {n: make_plan(scene, RenderSettings(size=size, samples=n, background=False)) for n in samples}
     reference = cached_reference(scene, next(iter(plans.values())), reference_samples)
     radiance = reference.radiance
     images = {n: pipeline.render(scene, plan).layers["beauty"][..., :3] for n, plan in plans.items()}
@@ -85,7 +85,7 @@ def cached_reference(scene: Scene, plan: Plan, samples: int) -> Reference:
 def _fingerprint(*parts: Any) -> str:
     """Of values, and of the program that makes references of them."""
     digest = hashlib.sha256()
-    for name in ("brdf", "mitsuba_plugins", "pathtraced"):
+    for name in ("brdf", "mitsuba_plugins", "pathtraced", "pathtraced_lights"):
         digest.update(Path(__file__).with_name(f"{name}.py").read_bytes())
     _digest(parts, digest)
     return digest.hexdigest()[:16]

@@ -1,7 +1,7 @@
 """A Scene's direct lighting by Mitsuba 3, path traced: the ground truth that accumulated samples converge to.
 
-Emitters carry a null BSDF and are hidden: like ours, lights neither show nor block. A distant light of some angle is a
-disk far away. `volpath` with two segments a path is direct lighting that sees through null surfaces.
+Emitters carry a null BSDF and are hidden: like ours, lights neither show nor block. `volpath` with two segments a path
+is direct lighting that sees through null surfaces.
 """
 
 from __future__ import annotations
@@ -16,17 +16,15 @@ from numpy.typing import NDArray
 
 from defshade_cli.errors import DefshadeError
 from defshade_cli.measure.mitsuba_plugins import mi
+from defshade_cli.measure.pathtraced_lights import emitter, transform, vector
 from defshade_cli.plan import Plan
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.geometry import Drawable, Mesh
-from defshade_cli.scene.light import CylinderLight, DiskLight, DistantLight, Light, RectLight, SphereLight
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import Matrix, normalize, transform_points
 
 _CHUNK = 64  # samples that Mitsuba holds in memory at a time
-_FAR = 1e4  # distance of a distant light's disk over the scene's radius
-_TURNED = np.diag([1.0, -1.0, -1.0, 1.0])  # Mitsuba's flat shapes face +Z, USD's lights −Z
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +63,7 @@ def _world(scene: Scene, plan: Plan) -> dict[str, Any]:
         world[f"part{number}"] = _mesh(f"part{number}", part, material)
     low, high = scene.bounds
     ball = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-    return world | {f"light{number}": _emitter(light, *ball) for number, light in enumerate(scene.lights)}
+    return world | {f"light{number}": emitter(light, *ball) for number, light in enumerate(scene.lights)}
 
 
 def _sensor(plan: Plan) -> dict[str, Any]:
@@ -79,7 +77,7 @@ def _sensor(plan: Plan) -> dict[str, Any]:
         "fov": math.degrees(2.0 * math.atan((right - left) / 2.0)),
         "near_clip": plan.clip[0],
         "far_clip": plan.clip[1],
-        "to_world": _transform(camera.world_from_camera @ np.diag([-1.0, 1.0, -1.0, 1.0])),
+        "to_world": transform(camera.world_from_camera @ np.diag([-1.0, 1.0, -1.0, 1.0])),
         "film": film | {"component_format": "float32", "pixel_format": "rgb"},
         "sampler": {"type": "multijitter", "sample_count": _CHUNK},
     } | _lens(camera)
@@ -157,84 +155,8 @@ def _bsdf(material: Material) -> dict[str, Any]:
     scalars = ("roughness", "clearcoat", "clearcoat_roughness")
     return {
         "type": "preview_surface",
-        "base": _vector(base),
-        "f0": _vector(f0),
-        "f90": _vector(f90),
+        "base": vector(base),
+        "f0": vector(f0),
+        "f90": vector(f90),
         "metallic": float(metallic),
     } | {name: float(getattr(material, name)) for name in scalars}
-
-
-def _emitter(light: Light, centre: NDArray[np.float64], radius: float) -> dict[str, Any]:
-    if isinstance(light, DistantLight):
-        return _distant(light, centre, radius)
-    if light.size_factor == 0.0 or (isinstance(light, SphereLight) and light.treat_as_point):
-        if light.shaping or light.profile != "uniform":
-            raise DefshadeError(f"{light.path}: path tracing takes no shaped light without a size")
-        return {"type": "point", "position": light.position.tolist(), "intensity": _rgb(light.intensity_on_axis)}
-    return _shape(light) | {"bsdf": {"type": "null"}, "emitter": _area(light)}
-
-
-def _distant(light: DistantLight, centre: NDArray[np.float64], radius: float) -> dict[str, Any]:
-    half = math.radians(light.angle) / 2.0
-    if half == 0.0:
-        return {"type": "directional", "direction": light.axis.tolist(), "irradiance": _rgb(light.irradiance)}
-    if half > math.radians(80.0):
-        raise DefshadeError(f"{light.path}: path tracing takes distant lights up to 160 degrees")
-    frame = light.world_from_light.copy()
-    frame[:3, :3] /= np.linalg.norm(frame[:3, :3], axis=0)
-    frame[:3, 3] = centre - light.axis * (_FAR * radius)
-    spread = _FAR * radius * math.tan(half)
-    to_world = _transform(frame @ _TURNED @ np.diag([spread, spread, 1.0, 1.0]))
-    emitter = {"type": "area", "radiance": _rgb(light.radiance)}
-    return {"type": "disk", "to_world": to_world, "bsdf": {"type": "null"}, "emitter": emitter}
-
-
-def _shape(light: Light) -> dict[str, Any]:
-    """The light's surface; spheres and cylinders must not be stretched."""
-    match light:
-        case SphereLight(radius=r):
-            return {"type": "sphere", "center": light.position.tolist(), "radius": r * _scale(light)}
-        case CylinderLight(radius=r, length=length):
-            ends = transform_points(light.world_from_light, np.array([[-length / 2, 0, 0], [length / 2, 0, 0]]))
-            return {"type": "cylinder", "p0": ends[0].tolist(), "p1": ends[1].tolist(), "radius": r * _scale(light)}
-        case DiskLight(radius=r):
-            kind, sides = "disk", (r, r)
-        case RectLight(width=width, height=height):
-            kind, sides = "rectangle", (width / 2, height / 2)
-        case _:
-            raise DefshadeError(f"{light.path}: path tracing knows no {light.kind} light")
-    return {"type": kind, "to_world": _transform(light.world_from_light @ _TURNED @ np.diag([*sides, 1.0, 1.0]))}
-
-
-def _scale(light: Light) -> float:
-    scales = np.linalg.norm(light.world_from_light[:3, :3], axis=0)
-    if np.ptp(scales) > 1e-4 * scales.max():
-        raise DefshadeError(f"{light.path}: path tracing takes no stretched {light.kind} light")
-    return float(scales.mean())
-
-
-def _area(light: Light) -> dict[str, Any]:
-    if light.shaping is None:
-        return {"type": "area", "radiance": _rgb(light.radiance)}
-    shaping, outer = light.shaping, math.radians(light.shaping.cone_angle)
-    return {
-        "type": "shaped_area",
-        "radiance": _vector(light.radiance),
-        "axis": _vector(light.axis),
-        "cone_angle": outer,
-        "cone_smooth_start": outer * (1.0 - min(max(shaping.cone_softness, 0.0), 1.0)),
-        "focus": max(shaping.focus, 0.0),
-        "focus_tint": _vector(np.array(shaping.focus_tint)),
-    }
-
-
-def _rgb(color: NDArray[np.float64]) -> dict[str, Any]:
-    return {"type": "rgb", "value": color.tolist()}
-
-
-def _vector(values: NDArray[np.float64]) -> Any:
-    return mi.ScalarVector3f(*values.tolist())
-
-
-def _transform(matrix: Matrix) -> Any:
-    return mi.ScalarTransform4f(matrix)

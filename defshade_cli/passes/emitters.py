@@ -57,7 +57,8 @@ def _emitters(number: int, planned: PlannedLight, plan: Plan, sample: Sample, ex
         if plan.samples == 1:
             return []
         places = (sample.on_light(number, k, DOME_DIRECTIONS) for k in range(DOME_DIRECTIONS))
-        return [sky_emitter(light, sky_of(light), u[:2], 1.0 / DOME_DIRECTIONS) for u in places]
+        directions = [sky_emitter(light, sky_of(light), u[:2], 1.0 / DOME_DIRECTIONS) for u in places]
+        return [direction.shared_by(plan.samples) for direction in directions]
     if plan.samples * planned.points == 1:
         return [far_field(light)]
     towards = extent.receivers.mean(axis=0) + plan.camera.position

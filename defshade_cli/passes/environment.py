@@ -1,7 +1,8 @@
 """The environment pass: what domes show behind the geometry, and in a frame of one sample their light on it.
 
 With more samples, directions drawn from the sky light the geometry like distant lights, with shadows
-(passes/emitters.py); this pass then draws the background, and the sky's image in lobes too sharp for them.
+(passes/emitters.py); this pass then draws the background, and the sky's image in lobes too sharp for them, as far as
+geometry leaves it open (passes/sky_visibility.py).
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.screen import Screen
+from defshade_cli.passes.sky_visibility import SkyVisibility
 from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.scene.environment import Environment
 from defshade_cli.scene.light import DomeLight
@@ -32,26 +34,31 @@ _HALF_MAX = 65504.0
 
 @dataclass(frozen=True, slots=True)
 class EnvironmentVariant:
-    """What the pass is compiled for. analytic: light the geometry too; background: show the sky."""
+    """What the pass is compiled for.
+
+    analytic: light the geometry too.  background: show the sky.  occlusion: geometry hides the sky from sharp lobes.
+    """
 
     planes: tuple[Plane, ...]
     layout: Layout
     orthographic: bool
     analytic: bool
     background: bool
+    occlusion: bool = False
     outputs: tuple[str, ...] = ()
     groups: int = 0
     space: RenderSpace = REC709
 
     @classmethod
-    def of(cls, plan: Plan) -> EnvironmentVariant:
+    def of(cls, plan: Plan, dome: PlannedLight) -> EnvironmentVariant:
         orthographic = plan.camera.projection == "orthographic"
-        shows = plan.samples == 1, plan.background
+        shows = plan.samples == 1, plan.background, plan.hides_sky(dome)
         return cls(plan.planes, plan.layout, orthographic, *shows, plan.outputs, plan.most_groups, plan.render_space)
 
     @property
     def defines(self) -> list[str]:
         flags = ["ORTHOGRAPHIC"] * self.orthographic + ["ANALYTIC"] * self.analytic + ["BACKGROUND"] * self.background
+        flags += ["OCCLUSION"] * self.occlusion
         return (
             [plane.define for plane in self.planes] + flags + space_defines(self.space) + output_defines(self.outputs)
         )
@@ -72,16 +79,21 @@ class EnvironmentPass:
         self._skies: dict[Environment, moderngl.Texture] = {}
 
     def draw(
-        self, planned: PlannedLight, gbuffer: GBuffer, targets: LightTargets, first_link: int = ALL_LINKED
+        self,
+        planned: PlannedLight,
+        gbuffer: GBuffer,
+        targets: LightTargets,
+        visibility: SkyVisibility | None = None,
+        first_link: int = ALL_LINKED,
     ) -> None:
-        """Add a dome to the targets. first_link: place of its bits, which are bound."""
+        """Add a dome to the targets. visibility: of skies, where some are hidden.  first_link: place of its bits."""
         dome = planned.light
         assert isinstance(dome, DomeLight)
         targets.of(planned.groups).use()
         self._gpu.context.enable_only(moderngl.BLEND)
         self._gpu.context.blend_func = moderngl.ONE, moderngl.ONE
         sky = sky_of(dome)
-        gbuffer.bind(self._program, sky=self._texture(sky))
+        gbuffer.bind(self._program, sky=self._texture(sky), **(visibility.textures if visibility else {}))
         for name, value in {**_uniforms(dome, sky), "first_link": first_link}.items():
             if name in self._program:
                 self._program[name] = value

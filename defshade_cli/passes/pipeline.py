@@ -26,6 +26,7 @@ from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
 from defshade_cli.passes.screen import Screen, TileMask
 from defshade_cli.passes.shadows import ShadowAtlas, ShadowPass
+from defshade_cli.passes.sky_visibility import SkyVisibility, SkyVisibilityPass
 from defshade_cli.passes.stopping import Stopping
 from defshade_cli.passes.tables import LightTables, TableStore
 from defshade_cli.passes.view import view_record
@@ -50,6 +51,7 @@ class Pipeline:
         self._gbuffer_pass = cache(lambda variant: GBufferPass(gpu, variant))
         self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant, self._screen))
         self._environment_pass = cache(lambda variant: EnvironmentPass(gpu, variant, self._screen))
+        self._sky_visibility_pass = cache(lambda variant: SkyVisibilityPass(gpu, variant, self._screen))
         self._shadow_pass = cache(
             lambda cutout, color_varies, texture_groups, linked: ShadowPass(
                 gpu, cutout=cutout, color_varies=color_varies, texture_groups=texture_groups, linked=linked
@@ -125,6 +127,8 @@ class Pipeline:
         radiance = self._frame.radiance("sample", plan.size, gbuffer)
         targets = self._frame.light_targets(radiance, plan)
         targets.clear()
+        hidden = any(plan.hides_sky(dome) for dome in plan.domes)
+        visibility = SkyVisibility.of(self._frame, plan.size) if hidden else None
         tables = self._tables.update(plan)
         self._accumulation.begin(plan.size, plan.samples)
         self._stopping.begin(plan)
@@ -136,7 +140,7 @@ class Pipeline:
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             if plan.mattes:
                 mattes.add(gbuffer.target.read("visible"))
-            self._light(draws, scene, plan, sample, tables, gbuffer, targets)
+            self._light(draws, scene, plan, sample, tables, gbuffer, targets, visibility)
             self._accumulation.add(radiance)
             if self._stopping.is_over(self._accumulation):
                 break
@@ -155,18 +159,25 @@ class Pipeline:
         tables: LightTables,
         gbuffer: GBuffer,
         targets: LightTargets,
+        visibility: SkyVisibility | None,
     ) -> None:
-        """One sample of every light: as many at a time as the shadow atlas holds."""
+        """One sample of every light: as many at a time as the shadow atlas holds; then the skies, seen as they let."""
         lighting = self._lighting_pass(LightingVariant.of(plan))
         lighting.begin(gbuffer, targets)
-        for dome in plan.domes:
-            environment = self._environment_pass(EnvironmentVariant.of(plan))
-            environment.draw(dome, gbuffer, targets, tables.links.lights.get(dome.light, ALL_LINKED))
+        openness = self._sky_visibility_pass(LightingVariant.of(plan)) if visibility else None
+        if openness and visibility:
+            openness.begin_sample(visibility)
         for batch in light_batches(scene, plan, sample) if plan.lit else ():
             shadows = self._shadow_maps(draws, batch, plan, sample, tables) if plan.shadows else None
             lights, emitters = [lit.planned for lit in batch], [lit.emitter for lit in batch]
             self._lights.write(light_records(lights, emitters, plan.camera.position, shadows, tables))
             lighting.add(lights, gbuffer, targets, shadows, tables)
+            if openness and visibility and shadows:
+                openness.add(lights, plan, gbuffer, visibility, shadows)
+        for dome in plan.domes:
+            environment = self._environment_pass(EnvironmentVariant.of(plan, dome))
+            first_link = tables.links.lights.get(dome.light, ALL_LINKED)
+            environment.draw(dome, gbuffer, targets, visibility, first_link)
 
     def _shadow_maps(
         self, draws: DrawList, batch: list[LitSample], plan: Plan, sample: Sample, tables: LightTables

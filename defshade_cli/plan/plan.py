@@ -149,6 +149,11 @@ class Plan:
     def domes(self) -> tuple[PlannedLight, ...]:
         return tuple(planned for planned in self.lights if isinstance(planned.light, DomeLight))
 
+    def hides_sky(self, planned: PlannedLight) -> bool:
+        """Is it a dome whose image in sharp lobes geometry hides, as far as samples tell?"""
+        casts = self.shadows and planned.light.casts_shadow
+        return isinstance(planned.light, DomeLight) and self.samples > 1 and casts
+
     @property
     def shadow_styles(self) -> bool:
         """Are some shadows other than black, or do they end?"""

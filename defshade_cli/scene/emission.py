@@ -113,9 +113,9 @@ def emitter_at(light: Light, u: Place, towards: Vector, *, inside: bool = True) 
 
 def sky_emitter(light: DomeLight, sky: Environment, u: tuple[float, float], share: float) -> Emitter:
     """A direction of the dome drawn by its sky's radiance, bearing `share` of the whole."""
-    direction, weight = sky.sample(u)
+    direction, weight, extent = sky.sample(u)
     axis = -normalize(light.world_from_light[:3, :3] @ direction)
-    return Emitter(light.position, axis, axis, "uniform", light.emission * weight * share)
+    return Emitter(light.position, axis, axis, "uniform", light.emission * weight * share, extent * share)
 
 
 def _within_ball(light: SphereLight, u: Place) -> Emitter:

@@ -38,17 +38,19 @@ class Environment:
     def __post_init__(self) -> None:
         object.__setattr__(self, "radiance", frozen(self.radiance, np.float32, *self.radiance.shape[:2], 3))
 
-    def sample(self, u: tuple[float, float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """A direction (3,) drawn in proportion to luminance, and the radiance from there over its density, (3,).
+    def sample(self, u: tuple[float, float]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        """A direction (3,) drawn in proportion to luminance, the radiance there over its density, (3,), and 1 over it.
 
         The mean of the second over samples is the integral of the radiance over all directions; black skies give 0.
+        The third is in steradians: the part of the sky that a single direction stands for.
         """
         row, column, down, right, chance = self._distribution.draw(u)
         sine = self._sines[row] + (self._sines[row + 1] - self._sines[row]) * down
         longitude = self._longitudes[column] + (self._longitudes[column + 1] - self._longitudes[column]) * right
         cosine = math.sqrt(max(1.0 - sine * sine, 0.0))
         direction = np.array([math.sin(longitude) * cosine, sine, math.cos(longitude) * cosine])
-        return direction, self._cells[row, column] * (self._solid_angles[row, column] / chance if chance > 0 else 0.0)
+        extent = float(self._solid_angles[row, column]) / chance if chance > 0 else 0.0
+        return direction, self._cells[row, column] * extent, extent
 
     @cached_property
     def irradiance_sh(self) -> NDArray[np.float64]:

@@ -30,9 +30,17 @@ void set_metallic_fresnel(inout Surface s, float dielectric_f0) {
     s.f0 = mix(dielectric_f0 * s.f90, s.f90, s.metallic);
 }
 
-// 1 for lobes too narrow for a sample's few directions of a sky to find, 0 for wide ones.
-float sharpness(float roughness) {
-    return 1.0 - smoothstep(0.25, 0.45, roughness);
+// 1 for lobes too narrow for the directions of a sky, four a sample, to find; 0 for wide ones. A lobe's solid angle goes
+// by the fourth power of its roughness, so that any of them is found by enough samples.
+float sharpness(float roughness, float pixel_share) {
+    float narrowest = sqrt(sqrt(16.0 * pixel_share));
+    return 1.0 - smoothstep(0.25 * narrowest, 0.45 * narrowest, roughness);
+}
+
+// A lobe that is wider by the patch of light that one point stands for.
+float widened_roughness(float roughness, float alpha_squared) {
+    float alpha = GGX_alpha(roughness);
+    return sqrt(min(sqrt(alpha * alpha + alpha_squared), 1.0));
 }
 
 struct Angles {

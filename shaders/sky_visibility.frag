@@ -1,0 +1,34 @@
+#include "lib/view.glsl"
+#include "lib/surface.glsl"
+#include "lib/light.glsl"
+#include "lib/shadow.glsl"
+#include "lib/luminance.glsl"
+#include "generated/planes.glsl"
+
+flat in uint light_index;
+out vec4 sent;                     // light of one direction of the sky in a sharp lobe: what reaches it, all, and 1
+
+// Heitz, Hill & McGuire 2018, "Combining Analytic Direct Illumination and Stochastic Shadows": the sky's image in a sharp
+// lobe, which is known, is multiplied by the share of such light that is not in shadow. The lobe is as wide as the
+// directions are apart, and GGX falls off slowly: where none is near, the nearest decides.
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    float stored = texelFetch(plane_depth, pixel, 0).x;
+    if (stored == BACKGROUND_DEPTH) discard;
+    Surface s = read_planes(pixel);
+    float sharpest = s.roughness;
+#ifdef PLANE_CLEARCOAT
+    if (s.clearcoat > 0.0) sharpest = min(sharpest, s.clearcoat_roughness);
+#endif
+    if (sharpness(sharpest, view.pixel_share) == 0.0) discard;
+    vec3 position = position_at(gl_FragCoord.xy, camera_depth(stored));
+    Light light = lights[light_index];
+    vec3 l;
+    vec3 irradiance = irradiance_from(light, position, l);
+    float widening = patch_alpha_squared(light, position, l);
+    s.roughness = widened_roughness(s.roughness, widening);
+    s.clearcoat_roughness = widened_roughness(s.clearcoat_roughness, widening);
+    vec3 v = direction_to_eye(position);
+    float weight = luminance(irradiance * evaluate_brdf(s, v, l, vec3(0.0, 1.0, 1.0)));
+    sent = vec4(weight * vec2(visibility(light, position, l), 1.0), 1.0, 0.0);
+}
