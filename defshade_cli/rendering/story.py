@@ -163,12 +163,12 @@ def _draw(shot: Shot, opened: OpenJob, renderer: Renderer, command: str) -> _Dra
         film = pipeline.render(scene, plan, moments, uploaded)
     with _timed(seconds, "show"):
         film = shown(film, shot, renderer)
-    facts = _provenance(shot, command) | film.metadata | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of}
+    facts = _provenance(shot, scene, command) | film.metadata | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of}
     return _Drawn(shot, replace(film, metadata=facts), plan, seconds)
 
 
-def _provenance(shot: Shot, command: str) -> dict[str, Any]:
-    facts = {"version": __version__, "command": command, "stage": shot.job.stage.name}
+def _provenance(shot: Shot, scene: Scene, command: str) -> dict[str, Any]:
+    facts = {"version": __version__, "command": command, "stage": shot.job.stage.name, "lights": scene.lit_by}
     product = {"product": shot.product.path} if shot.product.path else {}
     return facts | product | shot.job.composition.choices
 

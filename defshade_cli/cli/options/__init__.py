@@ -77,6 +77,7 @@ def make_job(values: dict[str, Any]) -> RenderJob:
         raise UsageError("--size and --width exclude each other")
     if values["frames"] and values["default_time"]:
         raise UsageError("--frames and --default-time exclude each other")
+    _check_camera(values)
     values["mask"] = values["mask"] or ()
     default_time = values.pop("default_time")
     values["frames"] = (None,) if default_time else values["frames"] or ()
@@ -87,6 +88,16 @@ def make_job(values: dict[str, Any]) -> RenderJob:
         output=OutputSettings(**take(values, OutputSettings)),
         **take(values, RenderJob),
     )
+
+
+def _check_camera(values: dict[str, Any]) -> None:
+    ours = next((name for name in ("turntable", "fit") if values[name]), None)
+    if ours and values["camera"]:
+        raise UsageError(f"--camera and --{ours} exclude each other")
+    if values["turntable"] and values["default_time"]:
+        raise UsageError("--turntable and --default-time exclude each other")
+    if values["direction"] and not ours:
+        raise UsageError("--direction is for --fit and --turntable")
 
 
 def take(values: dict[str, Any], owner: Any) -> dict[str, Any]:
