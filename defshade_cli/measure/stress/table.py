@@ -17,9 +17,7 @@ def summary(verdicts: Iterable[Verdict]) -> str:
     found = list(verdicts)
     families = [_row(name, list(those)) for name, those in groupby(found, lambda v: v.corner.family)]
     beyond = [
-        f"- {v.corner.family}, {v.corner.name}: {v.worst:.1e}. {_reason(v.corner)}."
-        for v in found
-        if v.worst > BOUND
+        f"- {v.corner.family}, {v.corner.name}: {v.worst:.1e}. {_reason(v.corner)}." for v in found if v.worst > BOUND
     ]
     refused = [f"- {v.corner.family}, {v.corner.name}: `{v.error}`" for v in found if v.error]
     return "\n".join([_HEADER, *families, "", "Past the bound:", "", *beyond, "", "Refused:", "", *refused])
