@@ -17,7 +17,7 @@ from defshade_cli.usd.binding import Bindings, bound_to
 from defshade_cli.usd.copies import Copies, once
 from defshade_cli.usd.draw_mode import FULL, handed_down, mode_above, takes_effect
 from defshade_cli.usd.geometry import Surface, is_time_varying
-from defshade_cli.usd.instancing import Piece, Standing, place
+from defshade_cli.usd.instancing import Piece, Standing, finite, place
 from defshade_cli.usd.kind import Kind
 from defshade_cli.usd.light import is_light, read_light
 from defshade_cli.usd.memory import Memory
@@ -60,7 +60,9 @@ class Traversal:
         memory.xforms.SetTime(time)
 
     def read_stage(self) -> tuple[Piece, ...]:
-        return self._read(self._stage.GetPseudoRoot().GetChildren(), Standing(draw_mode=FULL))
+        pieces, lost = finite(self._read(self._stage.GetPseudoRoot().GetChildren(), Standing(draw_mode=FULL)))
+        self.issues.update(dict.fromkeys(Unsupported(path, "its transform is not finite") for path in lost))
+        return pieces
 
     def _read(
         self, roots: Iterable[Usd.Prim], above: Standing, predicate: object = Usd.PrimDefaultPredicate
