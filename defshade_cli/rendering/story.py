@@ -86,7 +86,7 @@ def time_steps(job: RenderJob) -> dict[str, float]:
     """
     with closing(run(replace(job, frames=job.frames[:1], output=OutputSettings()))) as results:
         seconds = next(results).seconds
-    return {step: taken for step, taken in seconds.items() if step != "write"}
+    return {step: taken for step, taken in seconds.items() if step not in ("show", "write")}
 
 
 def render(
@@ -108,7 +108,14 @@ def render(
         raise UsageError(f"no render option named {', '.join(unknown)}; there are {', '.join(sorted(known))}")
     settings = RenderSettings(**{"layers": (BEAUTY,), **options})
     frames = (frame,) if frame is not None else ()
-    job = RenderJob(Path(stage), frames, camera, composition=composition or Composition(), settings=settings)
+    job = RenderJob(
+        Path(stage),
+        frames,
+        camera,
+        composition=composition or Composition(),
+        settings=settings,
+        given=frozenset(options),
+    )
     with closing(run(job)) as results:
         result = next(results)
     film = result.images[0].film

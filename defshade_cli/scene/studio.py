@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -72,14 +73,13 @@ def _rect(box: _Softbox, radius: float, world_from_asset: Matrix) -> RectLight:
 
 
 def _dome(upright: Matrix) -> DomeLight:
-    return DomeLight(
-        path="<studio dome>", world_from_light=upright, color=np.ones(3), environment=Environment(_gradient())
-    )
+    return DomeLight(path="<studio dome>", world_from_light=upright, color=np.ones(3), environment=_sky())
 
 
-def _gradient() -> np.ndarray:
-    """(rows, 4, 3): the sky fades to the horizon, and this to the ground without an edge."""
+@cache
+def _sky() -> Environment:
+    """It fades from above to the horizon, and to the ground without an edge. One for all, since devices keep it."""
     height = np.cos(math.pi * (np.arange(_ROWS) + 0.5) / _ROWS)
     above, below = np.maximum(height, 0.0), np.maximum(-height, 0.0)
     radiance = _HORIZON + (_SKY - _HORIZON) * above + (_GROUND - _HORIZON) * (below * below * (3.0 - 2.0 * below))
-    return np.broadcast_to(radiance[:, None, None], (_ROWS, 4, 3)).astype(np.float32)
+    return Environment(np.broadcast_to(radiance[:, None, None], (_ROWS, 4, 3)).astype(np.float32))
