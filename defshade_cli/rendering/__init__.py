@@ -1,7 +1,7 @@
 """One job from its stage to its files.
 
-story      the frames of a job, one after another        results   what became of them
-renderer   the graphics devices that they are drawn on
+story      the frames of a job, one after another    results    what became of them
+pictures   what a device shows of them               renderer   the devices
 """
 
 from defshade_cli.rendering.renderer import Renderer

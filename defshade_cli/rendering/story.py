@@ -19,6 +19,7 @@ from defshade_cli.image.files import write
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import BEAUTY
 from defshade_cli.plan import Plan, make_plan, plan_moments
+from defshade_cli.rendering.pictures import shown
 from defshade_cli.rendering.renderer import Renderer
 from defshade_cli.rendering.results import FrameResult, ImageResult
 from defshade_cli.scene.scene import Scene
@@ -160,6 +161,8 @@ def _draw(shot: Shot, opened: OpenJob, renderer: Renderer, command: str) -> _Dra
     with _timed(seconds, "draw"):
         moments = plan_moments(plan, reader.read_shutter(scene, plan.moments), job.settings)
         film = pipeline.render(scene, plan, moments, uploaded)
+    with _timed(seconds, "show"):
+        film = shown(film, shot, renderer)
     facts = _provenance(shot, command) | film.metadata | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of}
     return _Drawn(shot, replace(film, metadata=facts), plan, seconds)
 

@@ -7,10 +7,13 @@ of the instance by the same rule: the nearest wins, unless one from above is str
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from pxr import Sdf, Usd, UsdShade
+
+PURPOSES = ("full", "preview", "")
+"""Of bindings, in order of preference where render settings have none; the empty name is for all purposes."""
 
 
 class Binding(NamedTuple):
@@ -34,7 +37,13 @@ class Bindings(NamedTuple):
     @property
     def candidates(self) -> tuple[Sdf.Path, ...]:
         """Material paths, the preferred first."""
-        return tuple(binding.material for binding in self if binding)
+        return self.candidates_for(PURPOSES)
+
+    def candidates_for(self, purposes: Sequence[str]) -> tuple[Sdf.Path, ...]:
+        """Material paths in the order of `purposes`, as UsdRenderSettings names them."""
+        by_purpose = {"full": self.full, "preview": self.preview, "": self.all_purpose, "allPurpose": self.all_purpose}
+        chosen = (by_purpose.get(purpose) for purpose in purposes)
+        return tuple(binding.material for binding in chosen if binding)
 
 
 NOTHING_BOUND = Bindings()

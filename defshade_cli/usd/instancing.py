@@ -9,9 +9,9 @@ NaN in arrays) and multiplies its matrices, in NumPy: instances of instances cos
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain, repeat
+from itertools import chain, compress, repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -118,6 +118,16 @@ def place(pieces: Iterable[Piece], placement: Placement) -> Iterator[Piece]:
         )
 
 
+def finite(pieces: Sequence[Piece]) -> tuple[tuple[Piece, ...], tuple[str, ...]]:
+    """The pieces where their transforms put them, and the paths of those that stand nowhere."""
+    if not pieces or np.isfinite(np.concatenate([piece.root_from_object for piece in pieces])).all():
+        return tuple(pieces), ()
+    masks: list[NDArray[np.bool_]] = [np.all(np.isfinite(piece.root_from_object), axis=(1, 2)) for piece in pieces]
+    kept = [_some(piece, mask) if not mask.all() else piece for piece, mask in zip(pieces, masks, strict=True)]
+    lost = (path for piece, mask in zip(pieces, masks, strict=True) for path in _paths_where(piece, ~mask))
+    return tuple(piece for piece in kept if len(piece.ids)), tuple(dict.fromkeys(lost))
+
+
 def read_display_of_instances(
     prim: Usd.Prim, time: Usd.TimeCode, count: int, issues: list[str]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -157,3 +167,20 @@ def _paths(piece: Piece, placement: Placement) -> tuple[str, ...]:
     )
     repeats = len(piece.ids) // len(piece.paths)
     return tuple(chain.from_iterable(chain.from_iterable(repeat(names, repeats) for names in copies)))
+
+
+def _some(piece: Piece, mask: NDArray[np.bool_]) -> Piece:
+    return replace(
+        piece,
+        root_from_object=piece.root_from_object[mask],
+        paths=_paths_where(piece, mask),
+        ids=piece.ids[mask],
+        display_color=piece.display_color[mask],
+        display_opacity=piece.display_opacity[mask],
+    )
+
+
+def _paths_where(piece: Piece, mask: NDArray[np.bool_]) -> tuple[str, ...]:
+    if len(piece.paths) != len(mask):
+        return piece.paths if mask.any() else ()
+    return tuple(compress(piece.paths, mask))

@@ -43,9 +43,7 @@ class Memory:
         self._models = draw_mode.StandIns()
         self._stand_ins: dict[tuple[Sdf.Path, str], Surface] = {}
 
-    def surface_around(
-        self, prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode, said: Said
-    ) -> Surface | None:
+    def surface_around(self, prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode, said: Said) -> Surface | None:
         """The surface at a time near `base`, a frame. A mesh that velocities carry has what it has at the frame.
 
         So its points keep their number while the shutter is open, whatever samples lie within.

@@ -17,13 +17,14 @@ from defshade_cli.usd.binding import Bindings, bound_to
 from defshade_cli.usd.copies import Copies, once
 from defshade_cli.usd.draw_mode import FULL, handed_down, mode_above, takes_effect
 from defshade_cli.usd.geometry import Surface, is_time_varying
-from defshade_cli.usd.instancing import Piece, Standing, place
+from defshade_cli.usd.instancing import Piece, Standing, finite, place
 from defshade_cli.usd.kind import Kind, Nature
 from defshade_cli.usd.light import is_light, read_light
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.mesh_light import Glow
 from defshade_cli.usd.native_instances import NativeInstances
 from defshade_cli.usd.point_instancer import has_varying_copies, read_point_instancer
+from defshade_cli.usd.render_pass import PassRules
 from defshade_cli.usd.said import Said, said_of
 from defshade_cli.usd.skel import Rig
 from defshade_cli.usd.xform import gf_matrix, matrix
@@ -38,26 +39,34 @@ _PROTOTYPE_CHILDREN = Usd.PrimIsActive & Usd.PrimIsLoaded
 class Traversal:
     """One walk at one time, in which each prototype is read once.
 
-    base: the frame that the time is of; other than `time` while a shutter is open.
+    rules: of a RenderPass.  base: the frame that the time is of; other than `time` while a shutter is open.
     issues: what is left out, as the keys of a dictionary to keep their order.
     dormant: something is absent now, but not at all times.
     glows: what makes surfaces lights, by their paths.  portals: paths of the hints for sampling domes.
     """
 
     def __init__(
-        self, stage: Usd.Stage, memory: Memory, time: Usd.TimeCode, purposes: Sequence[str], base: Usd.TimeCode
+        self,
+        stage: Usd.Stage,
+        memory: Memory,
+        time: Usd.TimeCode,
+        purposes: Sequence[str],
+        base: Usd.TimeCode,
+        rules: PassRules | None = None,
     ) -> None:
         self.issues: dict[Unsupported, None] = {}
         self.dormant = False
         self.glows: dict[str, Glow] = {}
         self.portals: list[str] = []
         self._stage, self._memory, self._purposes = stage, memory, purposes
-        self._time, self._base = time, base
+        self._time, self._base, self._rules = time, base, rules
         self._prototypes: dict[tuple[Sdf.Path, Sdf.Path | None], tuple[Piece, ...] | None] = {}
         memory.xforms.SetTime(time)
 
     def read_stage(self) -> tuple[Piece, ...]:
-        return self._read(self._stage.GetPseudoRoot().GetChildren(), Standing(draw_mode=FULL))
+        pieces, lost = finite(self._read(self._stage.GetPseudoRoot().GetChildren(), Standing(draw_mode=FULL)))
+        self.issues.update(dict.fromkeys(Unsupported(path, "its transform is not finite") for path in lost))
+        return pieces
 
     def _read(
         self, roots: Iterable[Usd.Prim], above: Standing, predicate: object = Usd.PrimDefaultPredicate
@@ -70,7 +79,7 @@ class Traversal:
             prim, above = stack.pop()
             nature = self._memory.kinds.of(prim)
             kind = nature.kind
-            if kind is Kind.SHADING:
+            if kind is Kind.SHADING or self._is_pruned(prim):
                 continue
             said = said_of(prim, primvars_above=above.primvars)
             here = self._stand(prim, above, nature, said)
@@ -80,6 +89,8 @@ class Traversal:
                 pieces.append(self._stand_in(prim, here))
                 continue
             pieces.extend(self._own_pieces(prim, kind, here, said))
+            if self._is_hidden(prim) and (kind is Kind.POINT_INSTANCER or prim.IsInstance()):
+                continue
             if kind is Kind.POINT_INSTANCER:
                 pieces.extend(self._point_instances(prim, here))
             elif prim.IsInstance() and not _is_rigged_from_above(prim, here):
@@ -107,6 +118,13 @@ class Traversal:
         here = Standing(root_from_prim, in_world, purpose, mode, rig, proxied, said.primvars)
         return here.with_rig(prim) if nature.is_skel_root else here
 
+    def _is_hidden(self, prim: Usd.Prim) -> bool:
+        """Itself, by the pass; what stands below it may be shown."""
+        return self._rules is not None and not self._rules.shows(prim.GetPath())
+
+    def _is_pruned(self, prim: Usd.Prim) -> bool:
+        return self._rules is not None and self._rules.prunes(prim.GetPath())
+
     def _is_visible(self, prim: Usd.Prim) -> bool:
         visibility = prim.GetAttribute(_VISIBILITY)
         if visibility.Get(self._time) != UsdGeom.Tokens.invisible:
@@ -116,6 +134,8 @@ class Traversal:
 
     def _own_pieces(self, prim: Usd.Prim, kind: Kind, here: Standing, said: Said) -> Iterator[Piece]:
         """What the prim itself is, whatever stands below it."""
+        if self._is_hidden(prim):
+            return
         if is_light(prim):
             yield from self._light(prim, here)
         if kind is Kind.GPRIM and here.purpose in (None, *self._purposes):
