@@ -29,6 +29,14 @@ FILTERS: dict[Filter, float] = {"box": 1.0, "gaussian": 2.0, "blackman-harris": 
 BITS: tuple[Bits, ...] = (8, 16)
 MOST_SAMPLES = 4096
 """Of a render that the error or the time ends."""
+CHOICES: dict[str, tuple[str, ...]] = {
+    "layout": LAYOUTS,
+    "shading": SHADINGS,
+    "complexity": COMPLEXITIES,
+    "filter": tuple(FILTERS),
+}
+"""Of RenderSettings, by the names of their fields."""
+
 PURPOSES = ("default", "render", "proxy", "guide")
 
 
@@ -188,6 +196,7 @@ class RenderJob:
     camera: prim path or name; None picks by the rule in usd/camera.py.
     render_settings: path of a RenderSettings or RenderPass prim; None finds one as usd/products.py does.
     product: path or name of a product of theirs; None makes all that the output's names can hold.
+    given: names of the RenderSettings that the user chose; the stage may say the others.
     device: EGL device index, None for the driver's default.
     """
 
@@ -200,3 +209,4 @@ class RenderJob:
     settings: RenderSettings = field(default_factory=RenderSettings)
     output: OutputSettings = field(default_factory=OutputSettings)
     device: int | None = None
+    given: frozenset[str] = frozenset()

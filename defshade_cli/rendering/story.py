@@ -115,7 +115,14 @@ def render(
         raise UsageError(f"no render option named {', '.join(unknown)}; there are {', '.join(sorted(known))}")
     settings = RenderSettings(**{"layers": (BEAUTY,), **options})
     frames = (frame,) if frame is not None else ()
-    job = RenderJob(Path(stage), frames, camera, composition=composition or Composition(), settings=settings)
+    job = RenderJob(
+        Path(stage),
+        frames,
+        camera,
+        composition=composition or Composition(),
+        settings=settings,
+        given=frozenset(options),
+    )
     with closing(run(job)) as results:
         result = next(results)
     film = result.images[0].film
