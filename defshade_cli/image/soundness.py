@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import BEAUTY
 
-
 Mask = NDArray[np.bool_]
 
 
