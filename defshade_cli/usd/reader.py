@@ -169,6 +169,7 @@ class StageReader:
             data_window=self._settings.data_window,
             labels=read_labels(self._stage, _paths(drawables), time) if self._extras.labels else {},
             assets=read_assets(self._stage, _paths(drawables)) if self._extras.assets else {},
+            purposes=self._purposes,
             rendering_space=self._settings.rendering_space,
         )
 
