@@ -43,7 +43,7 @@ def _tile(film: Film, name: str, transform: DisplayTransform) -> Pixels:
     image = _scaled(np.broadcast_to(_colors(film, name, row, transform), (*pixels.shape[:2], 3)))
     strip = _panel(_STRIP, image.shape[1])
     caption, legend = _legend(film, row, pixels)
-    if legend is not None:
+    if legend is not None and legend.shape[1] + 12 <= image.shape[1]:
         middle = (_STRIP - legend.shape[0]) // 2
         strip[middle : middle + legend.shape[0], -legend.shape[1] - 6 : -6] = legend
     strip = _written(strip, 6, 18, name, 16, _TEXT)
