@@ -168,9 +168,10 @@ def test_shadows_move_along(pipeline: Pipeline, name: str) -> None:
 
 
 def test_lights_apart_add_up_to_lights_together(pipeline: Pipeline) -> None:
-    """Exactly with one sample, in which lights are points; each light's reach has its share of the tolerance, 1e-5."""
-    together = render(pipeline, stage(*LIGHTS.values()), background=False)
-    apart = sum(render(pipeline, stage(light), background=False) for light in LIGHTS.values())
+    """Exactly where lights are points; each light's reach has its share of the tolerance, 1e-5."""
+    options = {"background": False, "light_points": 1}
+    together = render(pipeline, stage(*LIGHTS.values()), **options)
+    apart = sum(render(pipeline, stage(light), **options) for light in LIGHTS.values())
     np.testing.assert_allclose(together, apart, rtol=1e-5, atol=2e-5)
 
 
@@ -186,8 +187,8 @@ def test_sampled_lights_add_up_on_average(pipeline: Pipeline) -> None:
 
 def test_a_light_given_twice_is_as_bright_as_one_of_twice_the_intensity(pipeline: Pipeline) -> None:
     light = LIGHTS["sphere"]
-    twice = render(pipeline, stage(light, light))
-    np.testing.assert_allclose(twice, 2.0 * render(pipeline, stage(light)), rtol=1e-5, atol=2e-5)
+    twice = render(pipeline, stage(light, light), light_points=1)
+    np.testing.assert_allclose(twice, 2.0 * render(pipeline, stage(light), light_points=1), rtol=1e-5, atol=2e-5)
 
 
 def test_an_instance_is_lit_like_a_copy(pipeline: Pipeline) -> None:

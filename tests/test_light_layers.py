@@ -142,7 +142,7 @@ def test_shadow_is_one_where_nothing_is_hidden_and_on_the_background(pipeline: P
 
 def test_light_complexity_counts_volumes(pipeline: Pipeline) -> None:
     """The sun reaches all that is covered, a bulb only what its reach touches; the background none."""
-    near = replace(bulb(0.0, 0.0, 0.3, intensity=1e-5), path="/near")
+    near = replace(bulb(0.0, 0.0, 0.3, intensity=1e-5), path="/near", treat_as_point=True)
     of = scene([quad(1.0)], [sun(), near], view=camera(5.0))
     layers = drawn(pipeline, of, "lightComplexity", "position", "alpha", light_tolerance=1e-3)
     (reach,) = [p.reach for p in make_plan(of, RenderSettings(light_tolerance=1e-3)).lights if p.light.path == "/near"]

@@ -46,7 +46,7 @@ class DisplayTransform:
         pixel would come out as a darker colour. Afterwards they are premultiplied again unless `straight`. NaN
         becomes 0. Raises UsageError for a space that the config cannot show.
         """
-        buffer = oiio.ImageBuf(_finite(np.ascontiguousarray(pixels, np.float32)))
+        buffer = oiio.ImageBuf(finite(np.ascontiguousarray(pixels, np.float32)))
         has_alpha = pixels.shape[-1] == 4
         if has_alpha:
             oiio.ImageBufAlgo.unpremult(buffer, buffer)
@@ -112,8 +112,8 @@ def picture(layer: Layer, pixels: Pixels, transform: DisplayTransform, *, alpha:
     return np.clip(show_coordinates(pixels) if pixels.shape[-1] == 2 else pixels, 0.0, 1.0)
 
 
-def _finite(pixels: Pixels) -> Pixels:
-    """Without NaN and infinity, on which OCIO's SIMD paths spoil the alpha of the pixel too."""
+def finite(pixels: Pixels) -> Pixels:
+    """Pixels without NaN and infinity, on which OCIO's SIMD paths spoil the alpha of the pixel too."""
     if abs(pixels.min()) <= BRIGHTEST and abs(pixels.max()) <= BRIGHTEST:
         return pixels
     return np.nan_to_num(pixels, nan=0.0).clip(-BRIGHTEST, BRIGHTEST)

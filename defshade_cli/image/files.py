@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from defshade_cli.errors import OutputError
-from defshade_cli.image.encoders import EXR, encode, suffix_of
+from defshade_cli.image.encoders import EXR, PICTURES, encode, suffix_of
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import BEAUTY, LAYERS, in_order
 from defshade_cli.image.verification import verify
@@ -39,6 +39,16 @@ def targets(layers: Iterable[str], output: OutputSettings, path: Path) -> dict[P
     if not output.split_layers and main in beside:
         beside[main] = path
     return {file: (name,) for name, file in beside.items()}
+
+
+def pictures(layers: Iterable[str], output: OutputSettings, path: Path) -> set[tuple[str, bool]]:
+    """(layer, with alpha) of every colour that `write` puts through the display transform for `path`."""
+    suffix = suffix_of(path)
+    if suffix == EXR:
+        return set()
+    sources = {v.name: v.layer for v in output.variables}
+    names = (sources.get(name, name) for shown in targets(layers, output, path).values() for name in shown)
+    return {(name, PICTURES[suffix].alpha) for name in names if LAYERS[name].is_color}
 
 
 def write(film: Film, output: OutputSettings, path: Path) -> tuple[Path, ...]:

@@ -49,6 +49,7 @@ class Film:
     samples: a pixel.
     origin: (x, y) of the first pixel in the display window, from its top left corner, y down.
     display: (width, height) of the display window that the camera fills; None where that is the layers' own size.
+    shown: (name, with alpha) → colour layers that a display transform has been applied to, in [0, 1], alpha straight.
     manifests: of layers that hold ids: name of the layer → what each id stands for.
     metadata: further facts for the file's header and `--stats`, JSON-like values.
     """
@@ -64,6 +65,7 @@ class Film:
     origin: tuple[int, int] = (0, 0)
     display: tuple[int, int] | None = None
     manifests: dict[str, dict[int, str]] = field(default_factory=dict)
+    shown: dict[tuple[str, bool], NDArray[np.float32]] = field(default_factory=dict)
     metadata: dict[str, Any] = field(default_factory=dict)
 
     def row(self, name: str) -> Layer:
@@ -92,7 +94,13 @@ class Film:
         rows = {v.name: replace(self.rows[v.layer], name=BEAUTY if v.name == main else v.name) for v in variables}
         manifests = {v.name: self.manifests[v.layer] for v in variables if v.layer in self.manifests}
         layers = {v.name: self._narrowed(v) for v in variables}
-        return replace(self, layers=layers, rows=rows, manifests=manifests)
+        shown = {
+            (v.name, alpha): self.shown[v.layer, alpha]
+            for v in variables
+            for alpha in (False, True)
+            if (v.layer, alpha) in self.shown
+        }
+        return replace(self, layers=layers, rows=rows, manifests=manifests, shown=shown)
 
     def _narrowed(self, variable: NamedLayer) -> NDArray[np.float32]:
         """The variable's channels; a matte has all its ranks, whatever type it is declared with."""

@@ -7,6 +7,8 @@ from types import TracebackType
 from typing import Self
 
 from defshade_cli.gpu.context import Gpu
+from defshade_cli.image.colour import DisplayTransform
+from defshade_cli.passes.display import DisplayPass
 from defshade_cli.passes.pipeline import Pipeline
 
 
@@ -18,7 +20,9 @@ class Renderer:
 
     def __init__(self) -> None:
         self._stack = ExitStack()
+        self._gpus: dict[int | None, Gpu] = {}
         self._pipelines: dict[int | None, Pipeline] = {}
+        self._displays: dict[tuple[int | None, DisplayTransform], DisplayPass | None] = {}
 
     def __enter__(self) -> Self:
         return self
@@ -31,9 +35,20 @@ class Renderer:
     def pipeline(self, device: int | None) -> Pipeline:
         """Raises GpuError."""
         if device not in self._pipelines:
-            self._pipelines[device] = Pipeline(self._stack.enter_context(Gpu(device)))
+            self._gpus[device] = self._stack.enter_context(Gpu(device))
+            self._pipelines[device] = Pipeline(self._gpus[device])
         return self._pipelines[device]
 
+    def display(self, device: int | None, transform: DisplayTransform) -> DisplayPass | None:
+        """The pass that shows images, on a device that a pipeline is of; None where there is no shader for it."""
+        if (device, transform) not in self._displays:
+            from defshade_cli.image.display_shader import display_shader
+
+            shader = display_shader(transform)
+            self._displays[device, transform] = DisplayPass(self._gpus[device], shader) if shader else None
+        return self._displays[device, transform]
+
     def close(self) -> None:
-        self._pipelines.clear()
+        for kept in (self._gpus, self._pipelines, self._displays):
+            kept.clear()
         self._stack.close()

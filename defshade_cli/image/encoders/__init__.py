@@ -10,6 +10,8 @@ from defshade_cli.image.encoders.pictures import PICTURES, write_picture
 from defshade_cli.image.film import Film
 from defshade_cli.settings import OutputSettings
 
+__all__ = ["EXR", "PICTURES", "SUFFIXES", "check_format", "encode", "suffix_of"]
+
 EXR = ".exr"
 SUFFIXES = (EXR, *PICTURES)
 

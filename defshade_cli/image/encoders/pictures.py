@@ -57,7 +57,9 @@ def write_picture(film: Film, name: str, output: OutputSettings, path: Path) -> 
     form, layer = PICTURES[path.suffix.lower()], film.row(name)
     pixels = bounded(name, film.layers[name], half=layer.is_color)
     transform = display_transform(output.display, output.view, output.look, film.render_space)
-    shown = picture(layer, pixels, transform, alpha=form.alpha)
+    shown = film.shown.get((name, form.alpha))
+    if shown is None:
+        shown = picture(layer, pixels, transform, alpha=form.alpha)
     bits = output.bits or form.bits[0]
     spec = make_spec(film, shown.shape[-1], f"uint{bits}")
     if layer.is_color:
