@@ -5,7 +5,7 @@
 #include "lib/luminance.glsl"
 #include "generated/planes.glsl"
 
-flat in uint light_index;
+flat in Light light;
 out vec4 sent;                     // light of one direction of the sky in a sharp lobe: what reaches it, all, and 1
 
 // Heitz, Hill & McGuire 2018, "Combining Analytic Direct Illumination and Stochastic Shadows": the sky's image in a sharp
@@ -22,7 +22,6 @@ void main() {
 #endif
     if (sharpness(sharpest, view.pixel_share) == 0.0) discard;
     vec3 position = position_at(gl_FragCoord.xy, camera_depth(stored));
-    Light light = lights[light_index];
     vec3 l;
     vec3 irradiance = irradiance_from(light, position, l);
     float widening = patch_alpha_squared(light, position, l);

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import OpenImageIO as oiio
 import pytest
 from click.testing import CliRunner, Result
 
+from defshade_cli.cli.inspect import inspect
 from defshade_cli.cli.render import render
 from defshade_cli.errors import DefshadeError, EmptyStage, UsageError
 from defshade_cli.farm.shots import make_shot
 from defshade_cli.image.layers.variables import layer_of
+from defshade_cli.image.reading import read, read_header
 from defshade_cli.scene.product import Product, Variable
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import OutputSettings, RenderJob
@@ -296,3 +299,32 @@ def test_purposes_of_bindings(settings: str, material: str) -> None:
     Path("bound.usda").write_text(BOUND)
     scene = StageReader(open_stage(Path("bound.usda")), render_settings=f"/{settings}").read(None)
     assert [each.path for each in scene.materials] == [material]
+
+
+def test_a_command_line_becomes_part_of_a_stage() -> None:
+    """What inspect saves, laid over the stage, renders what the options did; options still go before it."""
+    options = ["--camera", "/side", "--size", "20x10", "--crop", "10x5+2+1", "--samples", "3", "--no-shadows"]
+    options += ["--layers", "beauty,depth", "--purposes", "default,proxy", "--exposure", "1.5", "--shading", "classic"]
+    typed = rendered("shot.usda", *options, "-o", "typed.exr")
+    done = CliRunner().invoke(inspect, ["shot.usda", *options, "--save-settings", "saved.usda"])
+    assert done.exception is None
+    laid_over = ["shot.usda", "--session-layer", "saved.usda", "--settings", "/Render/settings"]
+    saved = rendered(*laid_over, "-o", "saved.exr")
+    for name, pixels in read(Path(*typed)).items():
+        np.testing.assert_array_equal(read(Path(*saved))[name], pixels)
+    header = read_header(Path(*rendered(*laid_over, "--samples", "2", "-o", "two.exr")))
+    assert header["samples"] == 2
+
+
+@pytest.mark.parametrize(
+    ("authored", "told"),
+    [
+        ("int defshade:filter = 3", "defshade:filter of the render settings is 3, not of type str"),
+        ('token defshade:filter = "sinc"', "is 'sinc'; there are box, gaussian, blackman-harris"),
+    ],
+)
+def test_settings_of_ours_are_checked(authored: str, told: str) -> None:
+    Path("ours.usda").write_text(
+        f'#usda 1.0\ndef Cube "c" {{\n}}\ndef Scope "Render" {{\ndef RenderSettings "s" {{\n{authored}\n}}\n}}'
+    )
+    assert told in str(invoke("ours.usda").exception)
