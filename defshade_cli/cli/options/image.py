@@ -101,6 +101,12 @@ def _shading_options() -> list[Function]:
             "usdrecord does.",
         ),
         option(
+            "--debug",
+            type=click.Choice(settings.DEBUGS),
+            help="Draw over the beauty: volumes are the shapes around the lights' reach, each in a colour; what fills "
+            "the image is a frame.",
+        ),
+        option(
             "--render-space",
             metavar="NAME",
             help="Scene-linear colour space that light and reflectance meet in, and that EXR holds: lin_rec709, ACEScg "
