@@ -17,8 +17,8 @@ from defshade_cli.passes.screen import Screen
 from defshade_cli.plan import PlannedLight, Volume
 from defshade_cli.settings import Layout
 
-_FILL, _WIRE, _FRAME = 0.03, 0.3, 0.9
-"""Opacity of a volume's faces, of its edges, and of a quad's frame."""
+_FILL, _WIRE, _HIDDEN, _FRAME = 0.03, 0.3, 0.08, 0.9
+"""Opacity of a volume's faces, of its edges, of edges behind geometry, and of a quad's frame."""
 
 
 class DebugVolumesPass:
@@ -54,8 +54,13 @@ class DebugVolumesPass:
             self._screen.draw(array)
             return
         array.program["first_light"] = number
-        self._context.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
-        for wireframe, opacity in ((False, _FILL), (True, _WIRE)):
+        visible = moderngl.BLEND | moderngl.DEPTH_TEST
+        for flags, wireframe, opacity in (
+            (visible, False, _FILL),
+            (visible, True, _WIRE),
+            (moderngl.BLEND, True, _HIDDEN),
+        ):
+            self._context.enable_only(flags)
             self._context.wireframe = wireframe
             array.program["opacity"] = opacity
             array.render(instances=1)
@@ -68,5 +73,7 @@ class DebugVolumesPass:
 
 
 def laid_over(image: NDArray[np.float32], overlay: NDArray[np.float32]) -> NDArray[np.float32]:
-    """`overlay` over `image`, both (H, W, 4) and premultiplied."""
-    return overlay + image * (1.0 - overlay[..., 3:])
+    """`overlay` over `image`, both (H, W, 4) and premultiplied; opaque, or faint colours would be lost on nothing."""
+    over = overlay + image * (1.0 - overlay[..., 3:])
+    over[..., 3] = 1.0
+    return over
