@@ -25,13 +25,8 @@ from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.motion import motion_records, neighbouring_points
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
-<<<<<<< HEAD
 from defshade_cli.passes.screen import WHOLE, Screen, TileMask
-from defshade_cli.passes.shadows import ShadowAtlas, ShadowPass
-=======
-from defshade_cli.passes.screen import Screen, TileMask
 from defshade_cli.passes.shadows import ShadowAtlas, ShadowPass, ShadowVariant
->>>>>>> main
 from defshade_cli.passes.stopping import Stopping
 from defshade_cli.passes.tables import LightTables, TableStore
 from defshade_cli.passes.view import view_record
