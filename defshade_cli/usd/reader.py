@@ -184,18 +184,17 @@ class StageReader:
         return found
 
     def _read_camera(
-        self, time: Usd.TimeCode, placed: Iterable[PlacedSurface]
+        self, time: Usd.TimeCode, placed: Sequence[PlacedSurface]
     ) -> tuple[Camera, tuple[Unsupported, ...]]:
         """The camera; one of ours frames the surfaces as authored, however they are refined, empty ones too."""
         if self._camera is None:
-            standing: dict[bytes, list[NDArray[np.float64]]] = defaultdict(list)
-            for piece, surface in placed:
-                standing[extent_of(self._stage, surface, time).tobytes()].append(piece.root_from_object)
-            boxes = (
-                world_boxes(np.frombuffer(extent).reshape(2, 3), _joined(matrices))
-                for extent, matrices in standing.items()
-            )
-            return framed_camera(enclose(boxes), facts.up_axis(self._stage)), ()
+            boxes = [
+                np.broadcast_to(extent_of(self._stage, surface, time), (len(piece.root_from_object), 2, 3))
+                for piece, surface in placed
+            ]
+            matrices = np.concatenate([np.empty((0, 4, 4)), *(piece.root_from_object for piece, _ in placed)])
+            room = world_boxes(np.concatenate([np.empty((0, 2, 3)), *boxes]), matrices)
+            return framed_camera(enclose([room]), facts.up_axis(self._stage)), ()
         camera, issues = read_camera(self._camera, time)
         return self._settings.applied_to(camera), issues
 
@@ -207,10 +206,9 @@ class StageReader:
         view = View(camera.conformed(aspect, self._settings.conform), height)
         placed = ((surface, piece.root_from_object) for piece, surface in drawn)
         chosen = choose_levels(placed, self._complexity, view)
-        return {
-            surface: self._tessellation.at_level(surface, levels.setdefault(surface.path, level))
-            for surface, level in chosen.items()
-        }
+        return self._tessellation.at_levels(
+            {surface: levels.setdefault(surface.path, level) for surface, level in chosen.items()}
+        )
 
 
 def _surfaces(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[PlacedSurface]:
@@ -257,7 +255,7 @@ def _drawable(mesh: int, subsets: tuple[Subset, ...], pieces: Sequence[Piece], u
         paths=tuple(path for piece in pieces for path in piece.paths),
         instance_ids=_joined([piece.ids for piece in pieces]),
         display_color=np.where(np.isnan(color), unauthored.diffuse_color, color),
-        display_opacity=np.nan_to_num(opacity, nan=unauthored.opacity),
+        display_opacity=np.where(np.isnan(opacity), unauthored.opacity, opacity),
     )
 
 
