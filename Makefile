@@ -63,8 +63,9 @@ accuracy: .venv/.ready-reference
 error-check: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.convergence docs/accuracy.md
 
-bench-farm: .venv/.ready
+bench-farm: .venv/.ready-dev
 	$(BIN)/python benchmarks/throughput.py
+	$(BIN)/python benchmarks/dask_scale.py
 
 farm-check: .venv/.ready-dev
 	$(BIN)/pytest -q -s -m slow tests/test_farm_scale.py
