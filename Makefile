@@ -8,6 +8,7 @@
 #   make bench-reading  measure what reading a stage costs
 #   make accuracy  measure accumulated light against Mitsuba 3, into docs/accuracy.md
 #   make error-check  compare the errors that renders claim with those that they have, into docs/accuracy.md
+#   make stress  render the corners of the arithmetic, into docs/stability.md
 #   make conformance  lay stages by others beside their references, into build/conformance and docs/conformance.md
 #   make wheel   build dist/*.whl
 #   make clean   remove what was built, the virtual environment too
@@ -16,7 +17,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lint docs tables bench-reading accuracy error-check conformance wheel clean
+.PHONY: demo test lint docs tables bench-reading accuracy error-check stress conformance wheel clean
 
 PYTHON ?= python3
 BIN := .venv/bin
@@ -59,6 +60,9 @@ accuracy: .venv/.ready-reference
 
 error-check: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.convergence docs/accuracy.md
+
+stress: .venv/.ready
+	$(BIN)/python -m defshade_cli.measure.stress docs/stability.md
 
 conformance: .venv/.ready
 	$(BIN)/python -m defshade_cli.measure.conformance build/conformance docs/conformance.md

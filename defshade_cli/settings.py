@@ -13,6 +13,7 @@ Existing = Literal["overwrite", "skip", "error"]
 Complexity = Literal["auto", "low", "medium", "high", "veryhigh"]
 Filter = Literal["box", "gaussian", "blackman-harris"]
 Payloads = Literal["all", "none"]
+OnNan = Literal["error", "warn", "fill"]
 Compression = Literal["zip", "zips", "piz", "dwaa", "none"]
 Bits = Literal[8, 16]
 
@@ -21,12 +22,21 @@ SHADINGS: tuple[Shading, ...] = ("preview-surface", "classic")
 EXISTING: tuple[Existing, ...] = ("overwrite", "skip", "error")
 COMPLEXITIES: tuple[Complexity, ...] = ("auto", "low", "medium", "high", "veryhigh")
 PAYLOADS: tuple[Payloads, ...] = ("all", "none")
+ON_NAN: tuple[OnNan, ...] = ("error", "warn", "fill")
 COMPRESSIONS: tuple[Compression, ...] = ("zip", "zips", "piz", "dwaa", "none")
 FILTERS: dict[Filter, float] = {"box": 1.0, "gaussian": 2.0, "blackman-harris": 3.0}
 """Widths in pixels, from end to end, where none is asked: those of Arnold."""
 BITS: tuple[Bits, ...] = (8, 16)
 MOST_SAMPLES = 4096
 """Of a render that the error or the time ends."""
+CHOICES: dict[str, tuple[str, ...]] = {
+    "layout": LAYOUTS,
+    "shading": SHADINGS,
+    "complexity": COMPLEXITIES,
+    "filter": tuple(FILTERS),
+}
+"""Of RenderSettings, by the names of their fields."""
+
 PURPOSES = ("default", "render", "proxy", "guide")
 
 
@@ -155,6 +165,8 @@ class OutputSettings:
     multipart: a part of the EXR for each layer.  tiled: EXR in tiles; mipmaps: in tiles with all smaller levels.
     bits: a channel of a picture; None takes the format's default.  dither: 8-bit colours, against banding.
     verify: read each file back and compare, before it takes its name.
+    on_nan: what becomes of a frame in which values are no numbers: an error once it is written, a warning, or the
+        values of the nearest sound pixels.
     """
 
     patterns: tuple[str, ...] = ()
@@ -173,6 +185,7 @@ class OutputSettings:
     bits: Bits | None = None
     dither: bool = False
     verify: bool = False
+    on_nan: OnNan = "error"
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,6 +196,7 @@ class RenderJob:
     camera: prim path or name; None picks by the rule in usd/camera.py.
     render_settings: path of a RenderSettings or RenderPass prim; None finds one as usd/products.py does.
     product: path or name of a product of theirs; None makes all that the output's names can hold.
+    given: names of the RenderSettings that the user chose; the stage may say the others.
     device: EGL device index, None for the driver's default.
     """
 
@@ -195,3 +209,4 @@ class RenderJob:
     settings: RenderSettings = field(default_factory=RenderSettings)
     output: OutputSettings = field(default_factory=OutputSettings)
     device: int | None = None
+    given: frozenset[str] = frozenset()

@@ -13,7 +13,7 @@ import pytest
 
 from defshade_cli import __version__
 from defshade_cli.image import files, reading
-from defshade_cli.image.metadata import frame_rate, provenance, world_to_camera, world_to_ndc
+from defshade_cli.image.metadata import frame_rate, provenance, time_code, world_to_camera, world_to_ndc
 from defshade_cli.scene.camera import Camera
 from defshade_cli.settings import OutputSettings
 from films import HEIGHT, WIDTH, WINDOW, film, tilted_camera
@@ -72,12 +72,30 @@ def test_frame_rates_are_rational(rate: float, rational: tuple[int, int]) -> Non
     assert frame_rate(rate) == rational
 
 
+@pytest.mark.parametrize(
+    ("frame", "rate", "code"),
+    [
+        (0.0, 24.0, 0x00000000),
+        (1001.0, 24.0, 0x00004117),  # 41 s 17 frames
+        (86399.0 * 25 + 24, 25.0, 0x23595924),
+        (86400.0 * 25, 25.0, None),
+        (1.5, 24.0, None),
+        (-1.0, 24.0, None),
+        (None, 24.0, None),
+        (30.0, 29.97, 0x00000100),
+    ],
+)
+def test_time_codes_count_from_frame_zero(frame: float | None, rate: float, code: int | None) -> None:
+    assert time_code(frame, rate) == code
+
+
 def test_header_as_openexr_reads_it(exr: Path) -> None:
     header = pytest.importorskip("OpenEXR").File(str(exr)).header()
     camera = tilted_camera()
     assert header["chromaticities"] == pytest.approx((0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329))
     assert header["colorInteropID"] == "lin_rec709_scene"
     assert header["FramesPerSecond"] == Fraction(24, 1)
+    assert "timeCode" in header
     assert header["owner"] == "A. Painter"
     assert header["Software"] == f"defshade {__version__}"
     assert "camera: /World/Cam" in header["comments"]

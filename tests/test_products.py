@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import OpenImageIO as oiio
 import pytest
 from click.testing import CliRunner, Result
 
+from defshade_cli.cli.inspect import inspect
 from defshade_cli.cli.render import render
 from defshade_cli.errors import DefshadeError, EmptyStage, UsageError
 from defshade_cli.farm.shots import make_shot
 from defshade_cli.image.layers.variables import layer_of
+from defshade_cli.image.reading import read, read_header
 from defshade_cli.scene.product import Product, Variable
+from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import OutputSettings, RenderJob
 from defshade_cli.usd.products import read_products
+from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.stage import open_stage
 
 STAGE = """#usda 1.0
@@ -213,3 +218,113 @@ def test_a_product_is_named_by_the_frame(assets: Path) -> None:
     assert rendered(str(stage), "--frames", "1010") == ["testrender.tif"]
     spec = spec_of("testrender.tif")
     assert (spec.width, spec.height, spec.nchannels) == (160, 120, 4)
+
+
+PASSES = """#usda 1.0
+def Xform "set" {
+    def Sphere "kept" {
+    }
+    def Sphere "pruned" {
+    }
+    def Sphere "hidden" {
+        def Cube "inside" {
+        }
+    }
+}
+def SphereLight "key" {
+}
+def SphereLight "fill" {
+}
+def RenderSettings "settings" {
+}
+def RenderPass "pass" {
+    rel renderSource = </settings>
+    rel collection:prune:includes = </set/pruned>
+    uniform bool collection:renderVisibility:includeRoot = 1
+    rel collection:renderVisibility:excludes = [</set/hidden>, </fill>]
+    rel collection:renderVisibility:includes = </set/hidden/inside>
+    rel collection:matte:includes = </set/kept>
+}
+"""
+
+
+def placed(scene: Scene) -> int:
+    """Copies of meshes in the world; equal ones share a drawable."""
+    return sum(len(drawable.world_from_object) for drawable in scene.drawables)
+
+
+def test_a_pass_prunes_and_hides() -> None:
+    Path("pass.usda").write_text(PASSES)
+    scene = StageReader(open_stage(Path("pass.usda")), render_settings="/pass").read(None)
+    assert placed(scene) == 2
+    assert [light.path for light in scene.lights] == ["/key"]
+    assert [str(issue.reason) for issue in scene.unsupported] == ["its collection matte is not followed"]
+
+
+def test_settings_alone_hide_nothing() -> None:
+    Path("pass.usda").write_text(PASSES)
+    scene = StageReader(open_stage(Path("pass.usda")), render_settings="/settings").read(None)
+    assert (placed(scene), len(scene.lights)) == (4, 2)
+
+
+BOUND = """#usda 1.0
+def Cube "cube" ( prepend apiSchemas = ["MaterialBindingAPI"] ) {
+    rel material:binding = </red>
+    rel material:binding:preview = </blue>
+}
+def RenderSettings "plain" {
+}
+def RenderSettings "preview" {
+    uniform token[] materialBindingPurposes = ["preview", ""]
+}
+def RenderSettings "everywhere" {
+    uniform token[] materialBindingPurposes = ["full", ""]
+}
+""" + "".join(
+    f"""def Material "{name}" {{
+    token outputs:surface.connect = </{name}/s.outputs:surface>
+    def Shader "s" {{
+        uniform token info:id = "UsdPreviewSurface"
+        token outputs:surface
+    }}
+}}
+"""
+    for name in ("red", "blue")
+)
+
+
+@pytest.mark.parametrize(("settings", "material"), [("plain", "/blue"), ("preview", "/blue"), ("everywhere", "/red")])
+def test_purposes_of_bindings(settings: str, material: str) -> None:
+    """Without a word of the settings a preview goes before what is bound for all purposes, as for `usdview`."""
+    Path("bound.usda").write_text(BOUND)
+    scene = StageReader(open_stage(Path("bound.usda")), render_settings=f"/{settings}").read(None)
+    assert [each.path for each in scene.materials] == [material]
+
+
+def test_a_command_line_becomes_part_of_a_stage() -> None:
+    """What inspect saves, laid over the stage, renders what the options did; options still go before it."""
+    options = ["--camera", "/side", "--size", "20x10", "--crop", "10x5+2+1", "--samples", "3", "--no-shadows"]
+    options += ["--layers", "beauty,depth", "--purposes", "default,proxy", "--exposure", "1.5", "--shading", "classic"]
+    typed = rendered("shot.usda", *options, "-o", "typed.exr")
+    done = CliRunner().invoke(inspect, ["shot.usda", *options, "--save-settings", "saved.usda"])
+    assert done.exception is None
+    laid_over = ["shot.usda", "--session-layer", "saved.usda", "--settings", "/Render/settings"]
+    saved = rendered(*laid_over, "-o", "saved.exr")
+    for name, pixels in read(Path(*typed)).items():
+        np.testing.assert_array_equal(read(Path(*saved))[name], pixels)
+    header = read_header(Path(*rendered(*laid_over, "--samples", "2", "-o", "two.exr")))
+    assert header["samples"] == 2
+
+
+@pytest.mark.parametrize(
+    ("authored", "told"),
+    [
+        ("int defshade:filter = 3", "defshade:filter of the render settings is 3, not of type str"),
+        ('token defshade:filter = "sinc"', "is 'sinc'; there are box, gaussian, blackman-harris"),
+    ],
+)
+def test_settings_of_ours_are_checked(authored: str, told: str) -> None:
+    Path("ours.usda").write_text(
+        f'#usda 1.0\ndef Cube "c" {{\n}}\ndef Scope "Render" {{\ndef RenderSettings "s" {{\n{authored}\n}}\n}}'
+    )
+    assert told in str(invoke("ours.usda").exception)

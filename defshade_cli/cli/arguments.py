@@ -12,7 +12,7 @@ from defshade_cli.cli.types import Crop, Size
 from defshade_cli.settings import Composition, OutputSettings, RenderJob, RenderSettings
 
 _OWNERS = {"composition", "settings", "output"}
-_NOT_OPTIONS = _OWNERS | {"stage", "frames", "session_layers", "patterns", "fallback", "variables"}
+_NOT_OPTIONS = _OWNERS | {"stage", "frames", "session_layers", "patterns", "fallback", "variables", "given"}
 
 
 def option_arguments(job: RenderJob, params: Iterable[click.Parameter]) -> list[str]:

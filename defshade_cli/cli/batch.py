@@ -74,7 +74,7 @@ def _takes_jobs(function: Function) -> Function:
         reporting, schedule = Reporting(**take(values, Reporting)), Schedule(**take(values, Schedule))
         context = click.get_current_context()
         shots = [shot for source in sources for shot in _shots(source, context)]
-        jobs = [with_output(make_job(values | shot), "{scene}") for shot in shots]
+        jobs = [with_output(make_job(values | shot | {"given": frozenset(shot)}), "{scene}") for shot in shots]
         return function(jobs, reporting, schedule)
 
     argument = click.argument(

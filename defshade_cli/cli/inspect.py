@@ -6,6 +6,7 @@ import json
 import math
 from collections import defaultdict
 from collections.abc import Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -27,6 +28,7 @@ _EPILOG = epilog(
     "defshade inspect shot.usd --frames 12 --plan",
     "defshade inspect scene.usda --json",
     "defshade inspect scene.usda --timing --width 960",
+    "defshade inspect shot.usd --samples 64 --layers beauty,depth --save-settings final.usda",
 )
 
 
@@ -34,16 +36,25 @@ _EPILOG = epilog(
 @takes_stage
 @click.option("--plan", "with_plan", is_flag=True, help="Add what the renderer decides for this stage, and why.")
 @click.option("--timing", is_flag=True, help="Draw the first frame too, and add what each step of it takes.")
+@click.option(
+    "--save-settings",
+    "saved",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE.usda",
+    help="Write the RenderSettings that the options amount to, for --session-layer or the stage's own layers.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON in place of a tree.")
-def inspect(job: RenderJob, as_json: bool, with_plan: bool, timing: bool) -> None:
+def inspect(job: RenderJob, as_json: bool, with_plan: bool, timing: bool, saved: Path | None) -> None:
     """Show what a render of SCENE would see.
 
     Cameras, lights and the volumes they are drawn as, materials, geometry, and the prims that would be left out. It
     renders nothing and needs no graphics device, but for --timing.
     """
-    from defshade_cli.rendering import examine, time_steps
+    from defshade_cli.rendering import examine, save_settings, time_steps
 
     scene, plan = examine(job)
+    if saved is not None:
+        save_settings(job, scene, plan, saved)
     seconds = time_steps(job) if timing else {}
     if as_json:
         record = _record(job, scene, plan) | ({"seconds": seconds} if timing else {})

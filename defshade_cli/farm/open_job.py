@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 
 from defshade_cli.farm.fingerprint import Fingerprint
+from defshade_cli.farm.own_settings import with_own_settings
 from defshade_cli.farm.shots import Shot, layers_of, make_shot, wanted_products
 from defshade_cli.image.layers.extras import extras_of
 from defshade_cli.image.layers.variables import layer_of
@@ -12,6 +13,7 @@ from defshade_cli.scene.product import Product
 from defshade_cli.settings import RenderJob
 from defshade_cli.usd.products import lost_products, read_products
 from defshade_cli.usd.reader import StageReader
+from defshade_cli.usd.saved_settings import read_own_settings
 from defshade_cli.usd.stage import first_frame, open_stage
 
 log = logging.getLogger("defshade")
@@ -24,8 +26,8 @@ class OpenJob:
     """
 
     def __init__(self, job: RenderJob) -> None:
-        self._job = job
         self._stage = open_stage(job.stage, job.composition, job.camera)
+        self._job = with_own_settings(job, read_own_settings(self._stage, job.render_settings))
         self._readers: dict[str, StageReader] = {}
         self._fingerprints: dict[str, Fingerprint] = {}
         self.frames: tuple[float | None, ...] = job.frames or (first_frame(self._stage),)

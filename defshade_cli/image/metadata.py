@@ -2,7 +2,7 @@
 
     colour     chromaticities, colorInteropID
     camera     worldToCamera, worldToNDC, screenWindowCenter, screenWindowWidth, pixelAspectRatio
-    time       framesPerSecond, capDate, utcOffset
+    time       framesPerSecond, timeCode, capDate, utcOffset
     people     owner (Film.metadata's), comments, Software
     defshade/  scene, camera, frame, samples and all of Film.metadata; layers: what each one's numbers mean, as JSON;
                LAYER/manifest: what ids stand for, as JSON
@@ -47,6 +47,8 @@ def exr_attributes(film: Film, layers: tuple[str, ...]) -> Iterator[Attribute]:
         yield Attribute("chromaticities", "float[8]", chromaticities)
     yield from _camera(film)
     yield Attribute("FramesPerSecond", "rational", frame_rate(film.frames_per_second))
+    if (code := time_code(film.frame, film.frames_per_second)) is not None:
+        yield Attribute("smpte:TimeCode", "timecode", (code, 0))
     yield from text_attributes(film)
     for name, value in provenance(film).items():
         yield _attribute(PREFIX + name, value)
@@ -114,6 +116,22 @@ def frame_rate(frames_per_second: float) -> tuple[int, int]:
     exact = ntsc if abs(float(ntsc) - frames_per_second) < 5e-4 else Fraction(frames_per_second)
     rate = exact.limit_denominator(1001)
     return rate.numerator, rate.denominator
+
+
+def time_code(frame: float | None, frames_per_second: float) -> int | None:
+    """Frame 0 is 00:00:00:00, in SMPTE 12M's digits as OpenEXR packs them: frames, seconds, minutes, hours.
+
+    None for the default time, parts of frames, negative ones, and what a day does not hold.
+    """
+    rate = round(frames_per_second)
+    if frame is None or frame < 0 or frame != int(frame) or rate < 1:
+        return None
+    seconds, frames = divmod(int(frame), rate)
+    minutes, hours = seconds // 60, seconds // 3600
+    if hours > 23 or frames > 39:
+        return None
+    fields = (frames, seconds % 60, minutes % 60, hours)
+    return sum((value // 10 * 16 + value % 10) << 8 * place for place, value in enumerate(fields))
 
 
 def world_to_camera(camera: Camera) -> Matrix:

@@ -28,7 +28,7 @@ from defshade_cli.settings import RenderSettings
 SIZE = (320, 180)
 SAMPLES = (1, 16, 256)
 
-REFERENCE_SAMPLES = 512
+REFERENCE_SAMPLES = 2048
 STAGES = Path("accuracy")
 CACHE = Path("out/accuracy")
 _CHARTS = ("materials",)

@@ -172,7 +172,9 @@ def light_records(
     records = np.zeros(len(lights), record("Light"))
     for row, planned, emitter in zip(records, lights, emitters, strict=True):
         row["position"], row["axis"], row["facing"] = emitter.position - eye, emitter.axis, emitter.facing
-        row["profile"], row["intensity"] = _PROFILES.index(emitter.profile), emitter.intensity
+        row["profile"] = _PROFILES.index(emitter.profile)
+        with np.errstate(over="ignore"):  # an infinity in the image is found after the frame, with its light
+            row["intensity"] = emitter.intensity
         row["response"] = (planned.light.diffuse, planned.light.specular)
         aside = float(np.linalg.norm(emitter.position - planned.light.position))
         row["reach"], row["extent"] = planned.reach + aside, emitter.extent

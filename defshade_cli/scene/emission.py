@@ -9,8 +9,8 @@ a ball that glows at each point alike in all directions, L / (π √(R² − r²
 
     ∫ ds / (π √(h² − s²)) = 1   over a chord of half length h,  R² − r² = h² − s²    (Abel's integral)
 
-so that each of its points bears the same intensity L π R². A cylinder's points are drawn by the cardioid
-1 + cos φ around the direction of what is lit.
+so that each of its points bears the same intensity L π R². A cylinder's points are drawn by the limaçon
+1 + 0.8 cos φ around the direction of what is lit.
 """
 
 from __future__ import annotations
@@ -39,6 +39,8 @@ from defshade_cli.spaces import cofactors, is_similarity, normalize, transform_p
 Vector = NDArray[np.float64]
 Place = tuple[float, float, float]
 """Coordinates in the unit cube."""
+
+_BIAS = 0.8  # of a cylinder's points; at 1 those that face away would bear any intensity, and something may face them
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,7 +157,7 @@ def _patch(light: Light, u: Place, towards: Vector) -> _Patch | None:
             (s, t), weight = shown.sample(u[:2])  # its top left is at (+X, +Y)
             return _Patch(np.array([(0.5 - s) * w, (0.5 - t) * h, 0.0]), _FORWARD, w * h, weight)
         case CylinderLight(radius=r, length=length):
-            turn, density = _cardioid(u[1])
+            turn, density = _limacon(u[1])
             normal = np.array([0.0, *_circle(turn + _turn_towards(light, towards), 1.0)])
             return _Patch(r * normal + [(u[0] - 0.5) * length, 0.0, 0.0], normal, math.tau * r * length / density)
     return None
@@ -170,14 +172,14 @@ def _turn_towards(light: Light, towards: Vector) -> float:
     return math.atan2(z, y) / math.tau
 
 
-def _cardioid(u: float) -> tuple[float, float]:
-    """The turn within ±1/2 at quantile `u` of the density 1 + cos(2π · turn), and its density."""
+def _limacon(u: float) -> tuple[float, float]:
+    """The turn within ±1/2 at quantile `u` of the density 1 + _BIAS cos(2π · turn), and its density."""
     low, high = -0.5, 0.5
     for _ in range(40):
         turn = 0.5 * (low + high)
-        below = turn + math.sin(math.tau * turn) / math.tau + 0.5 < u
+        below = turn + _BIAS * math.sin(math.tau * turn) / math.tau + 0.5 < u
         low, high = (turn, high) if below else (low, turn)
-    return turn, max(1.0 + math.cos(math.tau * turn), 1e-9)
+    return turn, 1.0 + _BIAS * math.cos(math.tau * turn)
 
 
 def _circle(turn: float, radius: float) -> tuple[float, float]:

@@ -7,9 +7,13 @@ of the instance by the same rule: the nearest wins, unless one from above is str
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from pxr import Sdf, Usd, UsdShade
+
+PURPOSES = ("full", "preview", "")
+"""Of bindings, in order of preference where render settings have none; the empty name is for all purposes."""
 
 
 class Binding(NamedTuple):
@@ -33,7 +37,13 @@ class Bindings(NamedTuple):
     @property
     def candidates(self) -> tuple[Sdf.Path, ...]:
         """Material paths, the preferred first."""
-        return tuple(binding.material for binding in self if binding)
+        return self.candidates_for(PURPOSES)
+
+    def candidates_for(self, purposes: Sequence[str]) -> tuple[Sdf.Path, ...]:
+        """Material paths in the order of `purposes`, as UsdRenderSettings names them."""
+        by_purpose = {"full": self.full, "preview": self.preview, "": self.all_purpose, "allPurpose": self.all_purpose}
+        chosen = (by_purpose.get(purpose) for purpose in purposes)
+        return tuple(binding.material for binding in chosen if binding)
 
 
 NOTHING_BOUND = Bindings()
@@ -49,12 +59,15 @@ class Bound(NamedTuple):
 NOTHING_ABOVE = Bound(NOTHING_BOUND, by_collection=False)
 
 
-def read_bound(prim: Usd.Prim, above: Bound) -> Bound:
-    """Of `prim`, whose parent has `above`: the same, unless it has bindings of its own or a collection may hold it."""
-    own = prim.GetAuthoredPropertiesInNamespace("material")
+def read_bound(prim: Usd.Prim, above: Bound, said: Collection[str]) -> Bound:
+    """Of `prim`, whose parent has `above`: the same, unless it has bindings of its own or a collection may hold it.
+
+    said: names of the properties authored on it.
+    """
+    own = [name for name in said if name.startswith("material:")]
     if not own and not above.by_collection:
         return above
-    by_collection = above.by_collection or any(":collection:" in each.GetName() for each in own)
+    by_collection = above.by_collection or any(":collection:" in name for name in own)
     return Bound(_resolve(prim), by_collection)
 
 

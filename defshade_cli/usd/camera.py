@@ -17,6 +17,7 @@ from defshade_cli.errors import PrimNotFound, StageError
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.spaces import rigid, translation
+from defshade_cli.usd.values import is_finite
 from defshade_cli.usd.xform import matrix
 
 log = logging.getLogger("defshade")
@@ -60,25 +61,34 @@ def choose_camera(
 
 
 def read_camera(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Camera, tuple[Unsupported, ...]]:
-    """The camera at `time`, and what of it is not honoured. Raises StageError where its aperture has no area."""
+    """The camera at `time`, and what of it is not honoured.
+
+    Raises StageError where its aperture has no area or its transform is not finite.
+    """
     schema, path = UsdGeom.Camera(prim), str(prim.GetPath())
     gf = schema.GetCamera(time)
     is_perspective = gf.projection == Gf.Camera.Perspective
+    if not is_finite(gf.transform):
+        raise StageError(f"camera {path} stands nowhere: its transform is not finite")
     planes, issues = _clipping_planes(gf, path)
+    lens = {
+        "exposure": schema.ComputeLinearExposureScale(time),
+        "f_stop": gf.fStop,
+        "focus_distance": gf.focusDistance,
+        "shutter": (schema.GetShutterOpenAttr().Get(time), schema.GetShutterCloseAttr().Get(time)),
+    }
+    odd = [name for name, value in lens.items() if not is_finite(value)]
     camera = Camera(
         path=path,
         world_from_camera=rigid(matrix(gf.transform)),
         window=_window(gf, path),
         projection="perspective" if is_perspective else "orthographic",
         clipping_range=_clipping_range(gf, path, is_perspective),
-        exposure=schema.ComputeLinearExposureScale(time),
-        f_stop=gf.fStop,
-        focus_distance=gf.focusDistance,
         focal_length=gf.focalLength * Gf.Camera.FOCAL_LENGTH_UNIT,
-        shutter=(schema.GetShutterOpenAttr().Get(time), schema.GetShutterCloseAttr().Get(time)),
         clipping_planes=planes,
+        **{name: value for name, value in lens.items() if name not in odd},
     )
-    return camera, issues
+    return camera, (*issues, *(Unsupported(path, f"its {name} is not finite") for name in odd))
 
 
 def framed_camera(bounds: NDArray[np.float64], up_axis: str) -> Camera:

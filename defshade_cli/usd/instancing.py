@@ -9,9 +9,9 @@ NaN in arrays) and multiplies its matrices, in NumPy: instances of instances cos
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain, repeat
+from itertools import chain, compress, repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +33,7 @@ class Standing(NamedTuple):
     draw_mode: of the models below; None below what is no model, where there are no others.
     rig: the outermost SkelRoot.
     proxied: the prototype that is walked and an instance of it, by whose proxies its prims are known on the stage.
+    primvars: some may be inherited.
     """
 
     root_from_prim: Gf.Matrix4d = IDENTITY
@@ -41,6 +42,7 @@ class Standing(NamedTuple):
     draw_mode: str | None = None
     rig: Rig | None = None
     proxied: tuple[Sdf.Path, Sdf.Path] | None = None
+    primvars: bool = False
 
     def on_stage(self, prim: Usd.Prim) -> Usd.Prim:
         """The prim, or the proxy of one in a prototype."""
@@ -56,7 +58,8 @@ class Standing(NamedTuple):
         """What an instance hands down into its prototype: nothing but its rig."""
         proxy = self.on_stage(instance)
         rig = Rig(proxy, IDENTITY, False) if self.rig else None
-        return Standing(rig=rig, proxied=(instance.GetPrototype().GetPath(), proxy.GetPath()))
+        proxied = instance.GetPrototype().GetPath(), proxy.GetPath()
+        return Standing(rig=rig, proxied=proxied, primvars=self.primvars)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,6 +118,16 @@ def place(pieces: Iterable[Piece], placement: Placement) -> Iterator[Piece]:
         )
 
 
+def finite(pieces: Sequence[Piece]) -> tuple[tuple[Piece, ...], tuple[str, ...]]:
+    """The pieces where their transforms put them, and the paths of those that stand nowhere."""
+    if not pieces or np.isfinite(np.concatenate([piece.root_from_object for piece in pieces])).all():
+        return tuple(pieces), ()
+    masks: list[NDArray[np.bool_]] = [np.all(np.isfinite(piece.root_from_object), axis=(1, 2)) for piece in pieces]
+    kept = [_some(piece, mask) if not mask.all() else piece for piece, mask in zip(pieces, masks, strict=True)]
+    lost = (path for piece, mask in zip(pieces, masks, strict=True) for path in _paths_where(piece, ~mask))
+    return tuple(piece for piece in kept if len(piece.ids)), tuple(dict.fromkeys(lost))
+
+
 def read_display_of_instances(
     prim: Usd.Prim, time: Usd.TimeCode, count: int, issues: list[str]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -154,3 +167,20 @@ def _paths(piece: Piece, placement: Placement) -> tuple[str, ...]:
     )
     repeats = len(piece.ids) // len(piece.paths)
     return tuple(chain.from_iterable(chain.from_iterable(repeat(names, repeats) for names in copies)))
+
+
+def _some(piece: Piece, mask: NDArray[np.bool_]) -> Piece:
+    return replace(
+        piece,
+        root_from_object=piece.root_from_object[mask],
+        paths=_paths_where(piece, mask),
+        ids=piece.ids[mask],
+        display_color=piece.display_color[mask],
+        display_opacity=piece.display_opacity[mask],
+    )
+
+
+def _paths_where(piece: Piece, mask: NDArray[np.bool_]) -> tuple[str, ...]:
+    if len(piece.paths) != len(mask):
+        return piece.paths if mask.any() else ()
+    return tuple(compress(piece.paths, mask))

@@ -31,6 +31,7 @@ from defshade_cli.usd.color_space import in_rec709
 from defshade_cli.usd.dome import is_dome, pole, sky_texture
 from defshade_cli.usd.light_files import with_files
 from defshade_cli.usd.mesh_light import Glow, is_mesh_light, read_glow
+from defshade_cli.usd.values import is_finite
 
 CAMERA_LIGHT = "<camera light>"
 """Path of the light of a stage that has none."""
@@ -52,6 +53,7 @@ _GROUP_ATTRIBUTES = (
 )
 """A light's group: ours, since UsdLux has none, then RenderMan's, Arnold's and Karma's."""
 
+_INPUTS = "inputs:"
 _WHITE = np.array(UsdLux.BlackbodyTemperatureAsRgb(6500.0))
 
 
@@ -135,7 +137,7 @@ def _shaping(prim: Usd.Prim, time: Usd.TimeCode) -> Shaping:
     return Shaping(
         focus=max(_input(prim, "shaping:focus", time), 0.0),
         focus_tint=tuple(_input(prim, "shaping:focusTint", time)),
-        cone_angle=_input(prim, "shaping:cone:angle", time),
+        cone_angle=max(_input(prim, "shaping:cone:angle", time), 0.0),
         cone_softness=min(max(_input(prim, "shaping:cone:softness", time), 0.0), 1.0),
         ies_angle_scale=_input(prim, "shaping:ies:angleScale", time),
         ies_normalize=_input(prim, "shaping:ies:normalize", time),
@@ -148,9 +150,13 @@ def _left_out(prim: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
     connected = [attr.GetName() for attr in prim.GetAuthoredAttributes() if attr.HasAuthoredConnections()]
     if connected:
         yield f"connections are ignored: {', '.join(connected)}"
+    authored = [attr for attr in prim.GetAuthoredAttributes() if attr.GetName().startswith(_INPUTS)]
+    if odd := [attr.GetName() for attr in authored if not is_finite(attr.Get(time))]:
+        yield f"not finite, so the schema's own values count: {', '.join(odd)}"
 
 
 def _input(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Any:
-    """Value of `inputs:name`, the schema's fallback included; None where the schema has no such input."""
-    attribute = prim.GetAttribute(f"inputs:{name}")
-    return attribute.Get(time) if attribute else None
+    """Value of `inputs:name`, or the schema's fallback, also for what is not finite; None where the schema has none."""
+    attribute = prim.GetAttribute(_INPUTS + name)
+    value = attribute.Get(time) if attribute else None
+    return value if is_finite(value) else prim.GetPrimDefinition().GetAttributeFallbackValue(_INPUTS + name)

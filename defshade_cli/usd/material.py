@@ -9,6 +9,7 @@ of which nothing is lost.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -22,6 +23,7 @@ from defshade_cli.usd.materialx.models import MODELS, translate
 from defshade_cli.usd.network import Network, computed, node_of
 from defshade_cli.usd.primvars import DISPLAY_COLOR
 from defshade_cli.usd.texture import Unreadable, read_texture_input
+from defshade_cli.usd.values import is_finite
 
 _FIELDS = {
     "diffuseColor": "diffuse_color",
@@ -87,12 +89,12 @@ def read_material(
     shader, identifier = _surface_of(prim)
     if identifier == _PREVIEW_SURFACE:
         inputs = _read_inputs(shader, network, () if occlusion else _WITHOUT_EFFECT)
-        material = Material(shown_as, **inputs.values, inputs=inputs.textures)
+        material = Material(shown_as, **_sound(inputs.values, inputs.left_out), inputs=inputs.textures)
         reason, left_out = "not read", inputs.left_out
     elif identifier in MODELS:
         translation = translate(shader, identifier, network, occlusion=occlusion)
-        material = Material(shown_as, **translation.values, inputs=translation.textures)
         reason, left_out = f"lost of {identifier}", list(translation.lost)
+        material = Material(shown_as, **_sound(translation.values, left_out), inputs=translation.textures)
     else:
         return _not_understood(shown_as, _surface_named(prim, shader, identifier))
     left_out.extend(f"textures at primvar {name}" for name in material.uv_names[UV_SETS:])
@@ -172,6 +174,16 @@ def _take_from_primvar(inputs: _Inputs, name: str, node: UsdShade.Shader, varnam
         inputs.values["uses_display_opacity"] = True
     else:
         inputs.left_out.append(f"{name} (primvar {varname})")
+
+
+def _sound(values: Mapping[str, Any], left_out: list[str]) -> dict[str, Any]:
+    """The values that light can be reckoned with; the others are named, and the schema's defaults take their place."""
+    odd = [name for name, value in values.items() if not is_finite(value)]
+    left_out.extend(f"{name} (not finite)" for name in odd)
+    if values.get("ior", 0.0) < 0.0:
+        left_out.append("ior (below 0)")
+        odd.append("ior")
+    return {name: value for name, value in values.items() if name not in odd}
 
 
 def _fallback(network: Network, node: UsdShade.Shader, channel: str) -> Any:

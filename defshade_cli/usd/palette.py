@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pxr import Usd
 
 from defshade_cli.scene.material import UNBOUND, Material
 from defshade_cli.scene.scene import Unsupported
-from defshade_cli.usd.binding import Bindings
+from defshade_cli.usd.binding import PURPOSES, Bindings
 from defshade_cli.usd.memory import Memory
 
 
 class Palette:
     """Materials numbered in order of first use.
 
-    Of the materials bound to a prim the first that is understood is taken, in the order full, preview, all purposes:
+    Of the materials bound to a prim the first that is understood is taken, in the order of `purposes`:
     a production look that only its own renderer knows gives way to the UsdPreviewSurface beside it. Where none is
     understood, the first is reported, once.
     """
 
-    def __init__(self, memory: Memory, time: Usd.TimeCode) -> None:
+    def __init__(self, memory: Memory, time: Usd.TimeCode, purposes: Sequence[str] = PURPOSES) -> None:
         self.issues: dict[Unsupported, None] = {}
-        self._memory, self._time = memory, time
+        self._memory, self._time, self._purposes = memory, time, purposes
         self._numbers: dict[Material, int] = {}
         self._chosen: dict[Bindings, Material] = {}
 
@@ -43,7 +45,7 @@ class Palette:
         return self._chosen[bindings]
 
     def _choose(self, bindings: Bindings) -> Material:
-        candidates = [self._memory.material(path, self._time) for path in bindings.candidates]
+        candidates = [self._memory.material(path, self._time) for path in bindings.candidates_for(self._purposes)]
         if not candidates:
             return UNBOUND
         chosen = next((candidate for candidate in candidates if candidate.understood), candidates[0])

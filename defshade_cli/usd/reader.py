@@ -35,6 +35,7 @@ from defshade_cli.usd.linking import link
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.mesh_light import Glow, Glows, glowing_lights, shown_material
 from defshade_cli.usd.palette import Palette
+from defshade_cli.usd.render_pass import pass_issues, read_pass
 from defshade_cli.usd.settings import read_settings
 from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.tessellation import Tessellation
@@ -83,8 +84,10 @@ class StageReader:
         self._stage, self._purposes = stage, tuple(self._settings.purposes if purposes is None else purposes)
         self._levels: dict[str, int] = {}
         self._lights: dict[str, Light] = {}
+        self._pass = read_pass(stage, render_settings)
         self._cameras = find_cameras(stage)
-        self._issues = tuple(arc.unsupported for arc in find_unresolved(stage))
+        unresolved = (arc.unsupported for arc in find_unresolved(stage))
+        self._issues = (*unresolved, *pass_issues(stage, render_settings))
         self._camera = choose_camera(stage, self._cameras, camera, self._settings.camera)
 
     @property
@@ -130,7 +133,7 @@ class StageReader:
     def _read(self, frame: float | None, time: Usd.TimeCode, levels: dict[str, int]) -> Scene:
         """levels: of refinement by path of the surface; those that are missing are chosen, and put in."""
         base = time if frame is None else Usd.TimeCode(frame)
-        traversal = Traversal(self._stage, self._memory, time, self._purposes, base)
+        traversal = Traversal(self._stage, self._memory, time, self._purposes, base, self._pass)
         pieces = traversal.read_stage()
         placed = tuple(_surfaces(pieces, self._purposes))
         drawn = tuple((piece, surface) for piece, surface in placed if surface.groups)
@@ -138,7 +141,7 @@ class StageReader:
             raise EmptyStage(_empty(self._stage, traversal.issues))
         camera, camera_issues = self._read_camera(time, placed)
         gprims = self._tessellate(drawn, camera, levels)
-        palette = Palette(self._memory, time)
+        palette = Palette(self._memory, time, self._settings.material_purposes)
         meshes: dict[Mesh, int] = {}
         glowing = _glowing(drawn, gprims, traversal.glows, palette)
         shown = [*_drawables(drawn, gprims, meshes, palette, glowing)]
@@ -166,6 +169,7 @@ class StageReader:
             data_window=self._settings.data_window,
             labels=read_labels(self._stage, _paths(drawables), time) if self._extras.labels else {},
             assets=read_assets(self._stage, _paths(drawables)) if self._extras.assets else {},
+            purposes=self._purposes,
             rendering_space=self._settings.rendering_space,
         )
 

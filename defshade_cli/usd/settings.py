@@ -11,6 +11,7 @@ from pxr import Usd, UsdRender
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.window import WHOLE_IMAGE
 from defshade_cli.spaces import ConformPolicy
+from defshade_cli.usd.binding import PURPOSES
 from defshade_cli.usd.products import find_settings
 
 log = logging.getLogger("defshade")
@@ -31,6 +32,7 @@ class StageSettings:
     pixel_aspect: width over height of a pixel; None lets the image cover the camera's aperture exactly.
     data_window: (xmin, ymin, xmax, ymax), 0..1 over the image, y up.
     purposes: of the geometry that is drawn.
+    material_purposes: of bindings, in order of preference.
     rendering_space: colour space that the image is rendered in.
     instantaneous: the shutter closes when it opens.
     """
@@ -41,6 +43,7 @@ class StageSettings:
     conform: ConformPolicy = "expandAperture"
     data_window: tuple[float, float, float, float] = WHOLE_IMAGE
     purposes: tuple[str, ...] = ("default", "render")
+    material_purposes: tuple[str, ...] = PURPOSES
     rendering_space: str | None = None
     motion_blur: bool = True
     instantaneous: bool = False
@@ -79,11 +82,18 @@ def read_settings(stage: Usd.Stage, path: str | None = None, product: str = "") 
         conform=next((known for known in _POLICIES if known == policy), "expandAperture"),
         data_window=tuple(_value(prims, "dataWindowNDC")),
         purposes=tuple(str(name) for name in settings.GetIncludedPurposesAttr().Get()),
+        material_purposes=_material_purposes(settings),
         rendering_space=settings.GetRenderingColorSpaceAttr().Get() or None,
         motion_blur=not _value(prims, "disableMotionBlur"),
         instantaneous=bool(_value(prims, "instantaneousShutter")),
         depth_of_field=not _value(prims, "disableDepthOfField"),
     )
+
+
+def _material_purposes(settings: UsdRender.Settings) -> tuple[str, ...]:
+    """As authored; the schema's own value would leave out previews, which are often all that we understand."""
+    attribute = settings.GetMaterialBindingPurposesAttr()
+    return tuple(map(str, attribute.Get())) if attribute.HasAuthoredValue() else PURPOSES
 
 
 def _value(prims: tuple[Usd.Prim, ...], name: str) -> Any:

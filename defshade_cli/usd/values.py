@@ -20,6 +20,12 @@ def floats(value: object, width: int) -> NDArray[np.float32] | None:
         return array.astype(np.float32, copy=False)
 
 
+def is_finite(value: object) -> bool:
+    """No number in `value` is infinite or NaN; what holds no numbers is finite too."""
+    array = np.asarray(value)
+    return array.dtype.kind != "f" or bool(np.isfinite(array).all())
+
+
 def integers(value: object) -> NDArray[np.integer] | None:
     """(N,) integers; None for anything else."""
     array = np.asarray(value)

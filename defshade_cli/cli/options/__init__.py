@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +78,7 @@ def make_job(values: dict[str, Any]) -> RenderJob:
     if values["frames"] and values["default_time"]:
         raise UsageError("--frames and --default-time exclude each other")
     values["mask"] = values["mask"] or ()
+    given = values.pop("given", frozenset()) | _typed()
     default_time = values.pop("default_time")
     values["frames"] = (None,) if default_time else values["frames"] or ()
     return RenderJob(
@@ -85,8 +86,18 @@ def make_job(values: dict[str, Any]) -> RenderJob:
         composition=Composition(**take(values, Composition)),
         settings=RenderSettings(**take(values, RenderSettings)),
         output=OutputSettings(**take(values, OutputSettings)),
+        given=given,
         **take(values, RenderJob),
     )
+
+
+def _typed() -> frozenset[str]:
+    """Names of the RenderSettings that stand on the command line."""
+    context = click.get_current_context(silent=True)
+    if context is None:
+        return frozenset()
+    typed = click.core.ParameterSource.COMMANDLINE
+    return frozenset(f.name for f in fields(RenderSettings) if context.get_parameter_source(f.name) is typed)
 
 
 def take(values: dict[str, Any], owner: Any) -> dict[str, Any]:
