@@ -15,6 +15,7 @@ from defshade_cli.settings import LAYOUTS
 _WIDTH, _HEIGHT, _MARGIN = 720.0, 440.0, 64.0
 _LEAST = 1e-9  # of an error that is drawn: a picture equal to the reference has none
 _COLORS = dict(zip(LAYOUTS, ("#c1440e", "#2a7f62", "#27519c"), strict=True))
+_LABELS = dict(zip(LAYOUTS, (-5.0, 4.0, 13.0), strict=True))  # beside the dot, so that they do not meet
 _TITLES = {"wall": "seconds to draw a frame", "cpu": "processor seconds to draw a frame"}
 _STYLE = "text{font:12px sans-serif;fill:#333}.grid{stroke:#ddd}.front{fill:none;stroke:#999;stroke-dasharray:5 4}"
 
@@ -45,7 +46,7 @@ class _Axis:
 def plot(bench: Bench, cost: Cost) -> str:
     """An SVG document: a dot a trial, hollow without shadows; a dashed line along the Pareto front."""
     x = _Axis.around([trial.cost(cost) for trial in bench.trials], _MARGIN, _WIDTH - 24.0)
-    y = _Axis.around([_error(trial) for trial in bench.trials], _HEIGHT - _MARGIN, 40.0)
+    y = _Axis.around([_error(trial) for trial in bench.trials], _HEIGHT - _MARGIN, 52.0)
     front = " ".join(f"{x.at(t.cost(cost)):.1f},{y.at(_error(t)):.1f}" for t in pareto_front(bench.trials, cost))
     width, height = bench.size
     lines = [
@@ -54,7 +55,7 @@ def plot(bench: Bench, cost: Cost) -> str:
         _text(_MARGIN, 22, f"{bench.stage.name}, {width}x{height}, {bench.device}"),
         *_grid(x, y),
         _text((x.first + x.last) / 2, _HEIGHT - 20, _TITLES[cost], "middle"),
-        _text(12, 36, "relMSE"),
+        _text(12, 34, "relMSE"),
         f'<polyline class="front" points="{front}"/>',
         *(_dot(trial, x.at(trial.cost(cost)), y.at(_error(trial))) for trial in bench.trials),
         *_legend(bench),
@@ -84,17 +85,17 @@ def _dot(trial: Trial, x: float, y: float) -> str:
     fill = color if trial.choice.shadows else "white"
     title = f"<title>{escape(str(trial.choice))}: relMSE {trial.rel_mse:.3g}</title>"
     circle = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.5" fill="{fill}" stroke="{color}" stroke-width="1.5">'
-    return f"{circle}{title}</circle>{_text(x + 7, y - 5, str(trial.choice.samples))}"
+    return f"{circle}{title}</circle>{_text(x + 7, y + _LABELS[trial.choice.layout], str(trial.choice.samples))}"
 
 
 def _legend(bench: Bench) -> Iterator[str]:
     shown = [layout for layout in LAYOUTS if any(trial.choice.layout == layout for trial in bench.trials)]
     for row, layout in enumerate(shown):
-        y = 52 + 18 * row
+        y = 66 + 18 * row
         yield f'<circle cx="{_WIDTH - 100:.0f}" cy="{y}" r="4.5" fill="{_COLORS[layout]}"/>'
         yield _text(_WIDTH - 88, y + 4, layout)
     if not all(trial.choice.shadows for trial in bench.trials):
-        yield _text(_WIDTH - 88, 52 + 18 * len(shown) + 4, "○ no shadows")
+        yield _text(_WIDTH - 105, 66 + 18 * len(shown) + 4, "○ no shadows")
 
 
 def _text(x: float, y: float, text: str, anchor: str = "start") -> str:
