@@ -77,6 +77,7 @@ def make_job(values: dict[str, Any]) -> RenderJob:
         raise UsageError("--size and --width exclude each other")
     if values["frames"] and values["default_time"]:
         raise UsageError("--frames and --default-time exclude each other")
+    _check_camera(values)
     values["mask"] = values["mask"] or ()
     given = values.pop("given", frozenset()) | _typed()
     default_time = values.pop("default_time")
@@ -89,6 +90,16 @@ def make_job(values: dict[str, Any]) -> RenderJob:
         given=given,
         **take(values, RenderJob),
     )
+
+
+def _check_camera(values: dict[str, Any]) -> None:
+    ours = next((name for name in ("turntable", "fit") if values[name]), None)
+    if ours and values["camera"]:
+        raise UsageError(f"--camera and --{ours} exclude each other")
+    if values["turntable"] and values["default_time"]:
+        raise UsageError("--turntable and --default-time exclude each other")
+    if values["direction"] and not ours:
+        raise UsageError("--direction is for --fit and --turntable")
 
 
 def _typed() -> frozenset[str]:
