@@ -48,9 +48,7 @@ class _Writer:
         """The accessor of (N, 3) floats or of (N,) indices."""
         kind, component = ("VEC3", _FLOAT) if values.ndim == 2 else ("SCALAR", _UNSIGNED)
         data = np.ascontiguousarray(values, np.float32 if values.ndim == 2 else np.uint32).tobytes()
-        self.views.append(
-            {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data), "target": target}
-        )
+        self.views.append({"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data), "target": target})
         self.binary += data
         accessor = {"bufferView": len(self.views) - 1, "componentType": component, "count": len(values), "type": kind}
         bounds = {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()} if values.ndim == 2 else {}

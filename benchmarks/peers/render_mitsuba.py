@@ -1,4 +1,5 @@
-"""Mitsuba 3, integrator `direct`: the USD stage through our own reader and converter, with UsdPreviewSurface as a plugin.
+"""Mitsuba 3, integrator `direct`: the USD stage through our own reader and converter, with UsdPreviewSurface
+as a plugin.
 
 So its picture converges to the same as ours, but for emitters that stand before others: those hide them there.
 """

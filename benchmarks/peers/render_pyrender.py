@@ -1,19 +1,17 @@
-"""pyrender: the GLB of a stage, rasterised. It leaves out shadows here, area lights and USD, and takes 4 lights a kind."""
+"""pyrender: the GLB of a stage, rasterised. It leaves out shadows here, area lights and USD, and takes 4 lights a kind.
+
+Without a display it needs PYOPENGL_PLATFORM=egl.
+"""
 
 from __future__ import annotations
 
 import json
-import os
 import struct
 import sys
 from pathlib import Path
 from typing import Any
 
-os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
-
 import numpy as np
-
-np.infty = np.inf  # pyrender 0.1.45 is older than NumPy 2
 import pyrender
 import trimesh
 from PIL import Image
