@@ -170,6 +170,7 @@ class OutputSettings:
     variables: what the stage's product has in a file, and under which names; empty has the layers as they are.
     display, view, look: of the OCIO config, for display-referred formats; None takes the config's default, and no look.
     full_float: 32-bit channels in EXR in place of half (data layers are always 32-bit).
+    sheet: pictures hold all layers, as labelled tiles.
     multipart: a part of the EXR for each layer.  tiled: EXR in tiles; mipmaps: in tiles with all smaller levels.
     bits: a channel of a picture; None takes the format's default.  dither: 8-bit colours, against banding.
     verify: read each file back and compare, before it takes its name.
@@ -187,6 +188,7 @@ class OutputSettings:
     full_float: bool = False
     compression: Compression = "zip"
     split_layers: bool = False
+    sheet: bool = False
     multipart: bool = False
     tiled: bool = False
     mipmaps: bool = False

@@ -25,7 +25,7 @@ from defshade_cli.passes.motion import motion_records, neighbouring_points
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
 from defshade_cli.passes.screen import Screen, TileMask
-from defshade_cli.passes.shadows import ShadowAtlas, ShadowPass
+from defshade_cli.passes.shadows import ShadowAtlas, ShadowPass, ShadowVariant
 from defshade_cli.passes.stopping import Stopping
 from defshade_cli.passes.tables import LightTables, TableStore
 from defshade_cli.passes.view import view_record
@@ -50,11 +50,7 @@ class Pipeline:
         self._gbuffer_pass = cache(lambda variant: GBufferPass(gpu, variant))
         self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant, self._screen))
         self._environment_pass = cache(lambda variant: EnvironmentPass(gpu, variant, self._screen))
-        self._shadow_pass = cache(
-            lambda cutout, color_varies, texture_groups, linked: ShadowPass(
-                gpu, cutout=cutout, color_varies=color_varies, texture_groups=texture_groups, linked=linked
-            )
-        )
+        self._shadow_pass = cache(lambda variant: ShadowPass(gpu, variant))
         self._tables = TableStore(gpu)
         self._accumulation = AccumulationPass(gpu, self._frame, self._screen)
         self._stopping = Stopping(gpu, self._frame, self._screen, self._mask)
@@ -171,10 +167,17 @@ class Pipeline:
     def _shadow_maps(
         self, draws: DrawList, batch: list[LitSample], plan: Plan, sample: Sample, tables: LightTables
     ) -> ShadowAtlas:
-        shadow_pass = self._shadow_pass(plan.cutout, draws.color_varies, draws.texture_groups, plan.shadow_linked)
+        variant = ShadowVariant(
+            plan.cutout,
+            plan.transparent,
+            draws.color_varies,
+            draws.texture_groups,
+            plan.shadow_linked,
+            plan.render_space,
+        )
         cameras = [lit.shadow_cameras for lit in batch]
         casters = [tables.links.casts.get(lit.planned.light, ALL_LINKED) for lit in batch]
-        return shadow_pass.draw(draws, cameras, sample.texel_offset, casters)
+        return self._shadow_pass(variant).draw(draws, cameras, sample.texel_offset, casters)
 
     def _data_planes(self, draws: DrawList, plan: Plan) -> Planes:
         """Planes for the data layers: the beauty's own where it drew them in float at the pixels' centres.
@@ -203,5 +206,7 @@ class Pipeline:
             draws.texture_groups,
             plan.render_space,
             len(plan.camera.clipping_planes),
+            plan.transparent,
+            plan.camera.projection == "orthographic",
         )
         self._gbuffer_pass(variant).draw(draws, gbuffer, self._mask, plan.camera, whole=bool(plan.mattes))

@@ -78,6 +78,7 @@ def make_job(values: dict[str, Any]) -> RenderJob:
     if values["frames"] and values["default_time"]:
         raise UsageError("--frames and --default-time exclude each other")
     _check_camera(values)
+    _check_output(values)
     values["mask"] = values["mask"] or ()
     given = values.pop("given", frozenset()) | _typed()
     default_time = values.pop("default_time")
@@ -90,6 +91,15 @@ def make_job(values: dict[str, Any]) -> RenderJob:
         given=given,
         **take(values, RenderJob),
     )
+
+
+def _check_output(values: dict[str, Any]) -> None:
+    """Not all commands have output."""
+    if values.get("sheet") and values["split_layers"]:
+        raise UsageError("--sheet and --split-layers exclude each other")
+    patterns = values.get("patterns")
+    if values.get("sheet") and patterns and all(pattern.lower().endswith(".exr") for pattern in patterns):
+        raise UsageError("--sheet is a picture: give -o a name such as sheet.png")
 
 
 def _check_camera(values: dict[str, Any]) -> None:
@@ -118,7 +128,8 @@ def take(values: dict[str, Any], owner: Any) -> dict[str, Any]:
 
 def with_output(job: RenderJob, name: str, *, fixed: bool = False) -> RenderJob:
     """`job` with the default file name where the user gave none. fixed: whatever names the stage's products have."""
-    fallback = f"{name}.####.exr" if len(job.frames) > 1 else f"{name}.exr"
+    suffix = ".png" if job.output.sheet else ".exr"
+    fallback = f"{name}.####{suffix}" if len(job.frames) > 1 else f"{name}{suffix}"
     patterns = job.output.patterns or (fallback,) * fixed
     return replace(job, output=replace(job.output, patterns=patterns, fallback=fallback))
 
