@@ -68,7 +68,7 @@ def test_glb_holds_the_stage(stages: ModuleType, tmp_path: Path) -> None:
 
 
 def test_a_process_is_measured(stages: ModuleType) -> None:
-    """A tenth of a second of work is a tenth of a processor second at least, 64 MiB are resident; a failure has no figures."""
+    """Work of 0.1 processor seconds takes as many at least, 64 MiB are resident; a failure has no figures."""
     compare = importlib.import_module("compare")
     work = "import time; x = bytearray(64 << 20)\nwhile time.process_time() < 0.1: pass"
     usage = compare.measure([sys.executable, "-c", work])
