@@ -11,6 +11,8 @@
 #   make error-check  compare the errors that renders claim with those that they have, into docs/accuracy.md
 #   make stress  render the corners of the arithmetic, into docs/stability.md
 #   make conformance  lay stages by others beside their references, into build/conformance and docs/conformance.md
+#   make bench-farm  frames a second by the number of workers
+#   make farm-check  a batch of a thousand frames while workers die and the disk fills
 #   make wheel   build dist/*.whl
 #   make clean   remove what was built, the virtual environment too
 
@@ -18,7 +20,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lint docs tables bench bench-reading accuracy error-check stress conformance wheel clean
+.PHONY: demo test lint docs tables bench bench-reading bench-farm accuracy error-check stress conformance wheel clean farm-check
 
 PYTHON ?= python3
 PEERS_PYTHON ?= .venv/bin/python
@@ -65,6 +67,12 @@ accuracy: .venv/.ready-reference
 
 error-check: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.convergence docs/accuracy.md
+
+bench-farm: .venv/.ready
+	$(BIN)/python benchmarks/throughput.py
+
+farm-check: .venv/.ready-dev
+	$(BIN)/pytest -q -s -m slow tests/test_farm_scale.py
 
 stress: .venv/.ready
 	$(BIN)/python -m defshade_cli.measure.stress docs/stability.md
