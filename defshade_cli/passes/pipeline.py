@@ -13,6 +13,7 @@ from defshade_cli.gpu.planes import MOST_TARGETS, Plane
 from defshade_cli.gpu.residence import LIGHTS, MOTIONS, VIEW, DrawList, GpuScene, RecordBuffer
 from defshade_cli.image.film import Film, Sampling
 from defshade_cli.passes.accumulation import AccumulationPass
+from defshade_cli.passes.debug_volumes import DebugVolumesPass, laid_over
 from defshade_cli.passes.emitters import LitSample, light_batches
 from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
 from defshade_cli.passes.frame import Frame
@@ -24,13 +25,14 @@ from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.motion import motion_records, neighbouring_points
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
-from defshade_cli.passes.screen import Screen, TileMask
+from defshade_cli.passes.screen import WHOLE, Screen, TileMask
 from defshade_cli.passes.shadows import ShadowAtlas, ShadowPass, ShadowVariant
 from defshade_cli.passes.sky_visibility import SkyVisibility, SkyVisibilityPass
 from defshade_cli.passes.stopping import Stopping
 from defshade_cli.passes.tables import LightTables, TableStore
 from defshade_cli.passes.view import view_record
 from defshade_cli.plan import Plan, ShutterSample
+from defshade_cli.scene.emission import far_field
 from defshade_cli.scene.scene import Scene
 
 Layers = dict[str, NDArray[np.float32]]
@@ -55,6 +57,7 @@ class Pipeline:
         self._shadow_pass = cache(lambda variant: ShadowPass(gpu, variant))
         self._tables = TableStore(gpu)
         self._accumulation = AccumulationPass(gpu, self._frame, self._screen)
+        self._debug_volumes_pass = cache(lambda: DebugVolumesPass(gpu))
         self._stopping = Stopping(gpu, self._frame, self._screen, self._mask)
 
     def upload(self, scene: Scene, plan: Plan) -> DrawList:
@@ -142,6 +145,8 @@ class Pipeline:
                 break
         sampling, counts, variance = self._stopping.finish(self._accumulation.count)
         beauty = self._accumulation.mean(counts)
+        if plan.debug == "volumes":
+            beauty = laid_over(beauty, self._volumes(draws, plan, tables, gbuffer))
         layers = {"beauty": beauty, "alpha": beauty[..., 3:]} | targets.layers(counts)
         layers |= {"variance": variance, "sampleCount": counts.astype(np.float32)}
         return layers | mattes.layers(self._accumulation.count), mattes.manifests(), sampling
@@ -174,6 +179,16 @@ class Pipeline:
             environment = self._environment_pass(EnvironmentVariant.of(plan, dome))
             first_link = tables.links.lights.get(dome.light, ALL_LINKED)
             environment.draw(dome, gbuffer, targets, visibility, first_link)
+
+    def _volumes(self, draws: DrawList, plan: Plan, tables: LightTables, gbuffer: GBuffer) -> NDArray[np.float32]:
+        """The light volumes as the pixels' centres see them, domes apart."""
+        self._mask.hide(WHOLE[:0])
+        self._draw_gbuffer(draws, plan, gbuffer, CENTRE)
+        lights = [planned for planned in plan.lights if planned not in plan.domes]
+        emitters = [far_field(planned.light) for planned in lights]
+        self._lights.write(light_records(lights, emitters, plan.camera.position, None, tables))
+        target = self._frame.radiance("debug", plan.size, gbuffer)
+        return self._debug_volumes_pass().draw(lights, target, gbuffer.layout)
 
     def _shadow_maps(
         self, draws: DrawList, batch: list[LitSample], plan: Plan, sample: Sample, tables: LightTables

@@ -26,7 +26,7 @@ from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.shadow import PLAIN
 from defshade_cli.scene.window import DataWindow, from_ndc
-from defshade_cli.settings import FILTERS, Complexity, Filter, Layout, RenderSettings, Shading
+from defshade_cli.settings import FILTERS, Complexity, Debug, Filter, Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
 from defshade_cli.units import exposure_scale
 
@@ -54,6 +54,7 @@ class Plan:
     portals: how many hints for sampling domes the stage has.
     levels: how often subdivision surfaces were refined, ascending; empty without any.
     ranks: (id, coverage) pairs of a Cryptomatte.
+    debug: of RenderSettings.
     """
 
     display: tuple[int, int]
@@ -86,6 +87,7 @@ class Plan:
     portals: int
     levels: tuple[int, ...]
     ranks: int
+    debug: Debug | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -180,6 +182,7 @@ class Plan:
         before = ("gbuffer", "emission", *("environment",) * bool(self.domes), *("shadow maps",) * self.shadows)
         lighting = before + tuple(f"light {volume}" for volume in self.volumes)
         accumulation = ("accumulation",) * (self.samples > 1) + ("batch means",) * self.tracks_error
+        accumulation += (f"debug {self.debug}",) * (self.debug is not None)
         return (lighting + accumulation if self.sampled else ()) + ("data gbuffer",) * self.data_pass
 
     @property
@@ -229,6 +232,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         data_pass=data_pass,
         complexity=settings.complexity,
         ranks=settings.cryptomatte_levels,
+        debug=settings.debug,
         portals=len(scene.portals),
         levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None})),
     )
