@@ -1,6 +1,6 @@
 """Frames a second of a batch by its number of workers, each with one thread of llvmpipe: `make bench-farm`.
 
-    python benchmarks/throughput.py [WORKERS...]
+python benchmarks/throughput.py [WORKERS...]
 """
 
 from __future__ import annotations
