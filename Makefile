@@ -13,6 +13,7 @@
 #   make conformance  lay stages by others beside their references, into build/conformance and docs/conformance.md
 #   make bench-farm  frames a second by the number of workers
 #   make farm-check  a batch of a thousand frames while workers die and the disk fills
+#   make gallery  render the documents' figures into docs/images
 #   make wheel   build dist/*.whl
 #   make clean   remove what was built, the virtual environment too
 
@@ -20,7 +21,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lint docs tables bench bench-reading bench-farm accuracy error-check stress conformance wheel clean farm-check
+.PHONY: demo test lint docs tables bench bench-reading bench-farm accuracy error-check stress conformance gallery wheel clean farm-check
 
 PYTHON ?= python3
 PEERS_PYTHON ?= .venv/bin/python
@@ -68,8 +69,9 @@ accuracy: .venv/.ready-reference
 error-check: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.convergence docs/accuracy.md
 
-bench-farm: .venv/.ready
+bench-farm: .venv/.ready-dev
 	$(BIN)/python benchmarks/throughput.py
+	$(BIN)/python benchmarks/dask_scale.py
 
 farm-check: .venv/.ready-dev
 	$(BIN)/pytest -q -s -m slow tests/test_farm_scale.py
@@ -82,6 +84,9 @@ conformance: .venv/.ready
 
 tables: .venv/.ready
 	$(BIN)/python -m defshade_cli.measure.layouts docs/lighting.md
+
+gallery: .venv/.ready
+	$(BIN)/python -m defshade_cli.measure.gallery docs/images
 
 wheel: .venv/.ready
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
