@@ -13,6 +13,7 @@
 #   make conformance  lay stages by others beside their references, into build/conformance and docs/conformance.md
 #   make bench-farm  frames a second by the number of workers
 #   make farm-check  a batch of a thousand frames while workers die and the disk fills
+#   make gallery  render the documents' figures into docs/images
 #   make wheel   build dist/*.whl
 #   make clean   remove what was built, the virtual environment too
 
@@ -20,7 +21,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lint docs tables bench bench-reading bench-farm accuracy error-check stress conformance wheel clean farm-check
+.PHONY: demo test lint docs tables bench bench-reading bench-farm accuracy error-check stress conformance gallery wheel clean farm-check
 
 PYTHON ?= python3
 PEERS_PYTHON ?= .venv/bin/python
@@ -83,6 +84,9 @@ conformance: .venv/.ready
 
 tables: .venv/.ready
 	$(BIN)/python -m defshade_cli.measure.layouts docs/lighting.md
+
+gallery: .venv/.ready
+	$(BIN)/python -m defshade_cli.measure.gallery docs/images
 
 wheel: .venv/.ready
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
