@@ -7,6 +7,7 @@
     │   ├── PrimNotFound      a camera, settings or mask path that the stage lacks
     │   └── EmptyStage        nothing to draw
     ├── GpuError          4   no context, a driver limit, out of memory
+    │   ├── GpuMemoryError    a target that does not fit
     │   └── ShaderError       a shader that does not compile, as file:line
     ├── OutputError       5   a file that cannot be written or read back
     │   └── UnsoundImage      it is written, and holds values that are no numbers
@@ -47,6 +48,10 @@ class EmptyStage(StageError):
 
 class GpuError(DefshadeError):
     exit_code = 4
+
+
+class GpuMemoryError(GpuError):
+    pass
 
 
 class ShaderError(GpuError):
