@@ -7,7 +7,7 @@ of the instance by the same rule: the nearest wins, unless one from above is str
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from pxr import Sdf, Usd, UsdShade
@@ -59,12 +59,15 @@ class Bound(NamedTuple):
 NOTHING_ABOVE = Bound(NOTHING_BOUND, by_collection=False)
 
 
-def read_bound(prim: Usd.Prim, above: Bound) -> Bound:
-    """Of `prim`, whose parent has `above`: the same, unless it has bindings of its own or a collection may hold it."""
-    own = prim.GetAuthoredPropertiesInNamespace("material")
+def read_bound(prim: Usd.Prim, above: Bound, said: Collection[str]) -> Bound:
+    """Of `prim`, whose parent has `above`: the same, unless it has bindings of its own or a collection may hold it.
+
+    said: names of the properties authored on it.
+    """
+    own = [name for name in said if name.startswith("material:")]
     if not own and not above.by_collection:
         return above
-    by_collection = above.by_collection or any(":collection:" in each.GetName() for each in own)
+    by_collection = above.by_collection or any(":collection:" in name for name in own)
     return Bound(_resolve(prim), by_collection)
 
 
