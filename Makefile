@@ -8,6 +8,8 @@
 #   make bench-reading  measure what reading a stage costs
 #   make accuracy  measure accumulated light against Mitsuba 3, into docs/accuracy.md
 #   make error-check  compare the errors that renders claim with those that they have, into docs/accuracy.md
+#   make fuzz    render mutated stages and images in contained processes: 10,000, or COUNT=N, from SEED=N
+#   make kill-check  kill renders at 200 random moments
 #   make stress  render the corners of the arithmetic, into docs/stability.md
 #   make conformance  lay stages by others beside their references, into build/conformance and docs/conformance.md
 #   make wheel   build dist/*.whl
@@ -17,7 +19,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lint docs tables bench-reading accuracy error-check stress conformance wheel clean
+.PHONY: demo test lint docs tables bench-reading accuracy error-check stress fuzz kill-check conformance wheel clean
 
 PYTHON ?= python3
 BIN := .venv/bin
@@ -60,6 +62,14 @@ accuracy: .venv/.ready-reference
 
 error-check: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.convergence docs/accuracy.md
+
+COUNT ?= 10000
+SEED ?= 1
+fuzz: .venv/.ready
+	$(BIN)/python -m defshade_cli.measure.fuzz $(COUNT) $(SEED)
+
+kill-check: .venv/.ready-dev
+	DEFSHADE_KILLS=200 $(BIN)/pytest -q tests/test_faults.py -k killed
 
 stress: .venv/.ready
 	$(BIN)/python -m defshade_cli.measure.stress docs/stability.md
