@@ -6,7 +6,7 @@ import difflib
 import math
 import re
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import click
 
@@ -62,6 +62,29 @@ class Finite(click.ParamType):
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a finite number", param, ctx)
         return number
+
+
+class Direction(click.ParamType):
+    """`left`, or `30,20` → (azimuth, elevation) in degrees from the front towards +X, and upwards."""
+
+    name = "direction"
+    names: ClassVar[dict[str, tuple[float, float]]] = {
+        "front": (0.0, 0.0),
+        "right": (90.0, 0.0),
+        "back": (180.0, 0.0),
+        "left": (-90.0, 0.0),
+        "top": (0.0, 90.0),
+        "bottom": (0.0, -90.0),
+    }
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+        if value in self.names:
+            return self.names[value]
+        match = re.fullmatch(r"([-+]?\d+(?:\.\d*)?),([-+]?\d+(?:\.\d*)?)", value)
+        if not match or abs(float(match[2])) > 90.0:
+            known = ", ".join(self.names)
+            self.fail(f"{value!r} is none of {known}, nor an azimuth and an elevation such as 30,20", param, ctx)
+        return float(match[1]), float(match[2])
 
 
 class Positive(Finite):

@@ -45,6 +45,8 @@ _NO_IES = 0xFFFFFFFF
 class LightingVariant:
     """What the pass is compiled for.
 
+    shaped: cones, focus or profiles of IES.  profiles: some point does not shine alike all around.
+    patches: points stand for some area of their light, and samples for some of their pixel.  sky: points of a dome.
     volumes: the kinds that some light has.  outputs: layers beside the radiance.  groups: those that one light is in.
     """
 
@@ -55,6 +57,10 @@ class LightingVariant:
     shadows: bool
     shadow_styles: bool
     ies: bool
+    shaped: bool
+    profiles: bool
+    patches: bool
+    sky: bool
     volumes: tuple[Volume, ...]
     outputs: tuple[str, ...] = ()
     groups: int = 0
@@ -63,6 +69,8 @@ class LightingVariant:
     @classmethod
     def of(cls, plan: Plan) -> LightingVariant:
         orthographic = plan.camera.projection == "orthographic"
+        lights = [planned.light for planned in plan.lights]
+        patches = plan.samples > 1 or any(planned.points > 1 for planned in plan.lights)
         return cls(
             plan.planes,
             plan.layout,
@@ -71,6 +79,10 @@ class LightingVariant:
             plan.shadows,
             plan.shadow_styles,
             bool(plan.profiles),
+            any(light.shaping for light in lights),
+            patches or any(light.profile != "uniform" for light in lights),
+            patches,
+            patches and bool(plan.domes),
             plan.volumes,
             plan.outputs,
             plan.most_groups,
@@ -84,6 +96,10 @@ class LightingVariant:
             ["SHADOWS"] * self.shadows
             + ["SHADOW_STYLES"] * self.shadow_styles
             + ["IES"] * self.ies
+            + ["SHAPED"] * self.shaped
+            + ["PROFILES"] * self.profiles
+            + ["PATCHES"] * self.patches
+            + ["SKY"] * self.sky
             + space_defines(self.space)
         )
         return [plane.define for plane in self.planes] + flags + output_defines(self.outputs)

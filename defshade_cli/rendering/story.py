@@ -180,7 +180,7 @@ def _draw(shot: Shot, opened: OpenJob, renderer: Renderer, command: str) -> _Dra
         checked = sound(film, scene, job.settings, pipeline, job.output.on_nan)
     with _timed(seconds, "show"):
         film = shown(checked.film, shot, renderer)
-    facts = _provenance(shot, command) | film.metadata | _cost(plan, seconds["draw"])
+    facts = _provenance(shot, scene, command) | film.metadata | _cost(plan, seconds["draw"])
     if not checked.fault:
         facts |= {FINGERPRINT: made_of}
     fault = checked.fault if job.output.on_nan == "error" else ""
@@ -191,8 +191,8 @@ def _moments(scene: Scene, plan: Plan, reader: StageReader, settings: RenderSett
     return plan_moments(plan, reader.read_shutter(scene, plan.moments), settings)
 
 
-def _provenance(shot: Shot, command: str) -> dict[str, Any]:
-    facts = {"version": __version__, "command": command, "stage": shot.job.stage.name}
+def _provenance(shot: Shot, scene: Scene, command: str) -> dict[str, Any]:
+    facts = {"version": __version__, "command": command, "stage": shot.job.stage.name, "lights": scene.lit_by}
     product = {"product": shot.product.path} if shot.product.path else {}
     return facts | product | shot.job.composition.choices
 

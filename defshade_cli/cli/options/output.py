@@ -48,6 +48,11 @@ def output_options(name: str) -> list[Function]:
             default_text=str(_OUTPUT.compression),
             help="Compression of EXR.",
         ),
+        option(
+            "--sheet",
+            is_flag=True,
+            help="One picture with all layers as labelled tiles, data in false colour with a legend.",
+        ),
         option("--split-layers", is_flag=True, help="One file a layer in place of one file with all."),
         option("--multipart", is_flag=True, help="One part a layer inside the EXR."),
         option("--tiled", is_flag=True, help="EXR in tiles in place of scanlines."),
