@@ -25,6 +25,8 @@ from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
 from defshade_cli.usd.conversion import write_as
 
 LIMITS = Limits(memory=2048, seconds=10.0)
+_PERIOD = 100
+"""Inputs from one count on stderr to the next."""
 _SETTINGS = RenderSettings(size=(32, 18))
 _MUTATED = {".usda", ".usdc", ".usdz", ".png", ".exr", ".ies", ".mtlx", ".jpg", ".hdr"}
 _NUMBERS = (b"-1", b"0", b"2147483647", b"-2147483648", b"1e308", b"nan", b"inf", b"4294967295", b"1e-320")
@@ -128,8 +130,15 @@ def main(count: int, seed: int = 1) -> int:
             if kind not in ("rendered", "error 2", "error 3"):
                 last = outcome.log.strip().rpartition("\n")[2]
                 print(f"{number}: {kind}: {case.stage.name} by {case.changed.name}: {outcome.error} {last}", flush=True)
-    print(f"{count} inputs, seed {seed}: " + ", ".join(f"{n} {kind}" for kind, n in sorted(found.items())))
+            if (number + 1) % _PERIOD == 0:
+                print(_counts(found, seed), file=sys.stderr, flush=True)
+    print(_counts(found, seed))
     return int(any(found[kind] for kind in ("hang", "memory", "a file outside")))
+
+
+def _counts(found: Counter[str], seed: int) -> str:
+    counts = ", ".join(f"{number} {kind}" for kind, number in sorted(found.items()))
+    return f"{found.total()} inputs, seed {seed}: {counts}"
 
 
 if __name__ == "__main__":
