@@ -12,6 +12,8 @@
 #   make kill-check  kill renders at 200 random moments
 #   make stress  render the corners of the arithmetic, into docs/stability.md
 #   make conformance  lay stages by others beside their references, into build/conformance and docs/conformance.md
+#   make bench-farm  frames a second by the number of workers
+#   make farm-check  a batch of a thousand frames while workers die and the disk fills
 #   make wheel   build dist/*.whl
 #   make clean   remove what was built, the virtual environment too
 
@@ -20,6 +22,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := demo
 .PHONY: demo test lint docs tables bench-reading accuracy error-check stress fuzz kill-check conformance wheel clean
+.PHONY: farm-check bench-farm
 
 PYTHON ?= python3
 BIN := .venv/bin
@@ -70,6 +73,12 @@ fuzz: .venv/.ready
 
 kill-check: .venv/.ready-dev
 	DEFSHADE_KILLS=200 $(BIN)/pytest -q tests/test_faults.py -k killed
+
+bench-farm: .venv/.ready
+	$(BIN)/python benchmarks/throughput.py
+
+farm-check: .venv/.ready-dev
+	$(BIN)/pytest -q -s -m slow tests/test_farm_scale.py
 
 stress: .venv/.ready
 	$(BIN)/python -m defshade_cli.measure.stress docs/stability.md

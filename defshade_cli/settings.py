@@ -16,6 +16,7 @@ Payloads = Literal["all", "none"]
 OnNan = Literal["error", "warn", "fill"]
 Compression = Literal["zip", "zips", "piz", "dwaa", "none"]
 Bits = Literal[8, 16]
+Debug = Literal["volumes"]
 
 LAYOUTS: tuple[Layout, ...] = ("rgba8", "packed", "float")
 SHADINGS: tuple[Shading, ...] = ("preview-surface", "classic")
@@ -26,6 +27,7 @@ ON_NAN: tuple[OnNan, ...] = ("error", "warn", "fill")
 COMPRESSIONS: tuple[Compression, ...] = ("zip", "zips", "piz", "dwaa", "none")
 FILTERS: dict[Filter, float] = {"box": 1.0, "gaussian": 2.0, "blackman-harris": 3.0}
 """Widths in pixels, from end to end, where none is asked: those of Arnold."""
+DEBUGS: tuple[Debug, ...] = ("volumes",)
 BITS: tuple[Bits, ...] = (8, 16)
 MOST_SAMPLES = 4096
 """Of a render that the error or the time ends."""
@@ -113,6 +115,7 @@ class RenderSettings:
     turntable: frames in which one goes around it, from frame 1 on; None for none.
     direction: (azimuth, elevation) in degrees from where these two look; None for scene.framing's.
     studio: a stage without lights gets those of scene/studio.py in place of one at the camera.
+    debug: what is drawn over the beauty: the lights' volumes.
     background: dome lights are seen behind the geometry, and cover there.
     motion_blur: several samples see as many moments of the camera's shutter.
     light_tolerance: scene-linear value that all dropped light together may reach in one pixel.
@@ -142,6 +145,7 @@ class RenderSettings:
     turntable: int | None = None
     direction: tuple[float, float] | None = None
     studio: bool = False
+    debug: Debug | None = None
     background: bool = True
     motion_blur: bool = True
 

@@ -16,6 +16,17 @@ float widened_roughness(float roughness, float alpha_squared) {
     return sqrt(min(sqrt(alpha * alpha + alpha_squared), 1.0));
 }
 
+float turn_at(Surface s, ivec2 pixel) {
+#ifdef PLANE_WEIGHTS
+    return s.turn;             // the neighbours may show what lies behind
+#else
+    ivec2 inward = ivec2(lessThan(vec2(pixel) * 2.0, view.size)) * 2 - 1;
+    vec3 across = read_planes(pixel + ivec2(inward.x, 0)).normal - s.normal;
+    vec3 along = read_planes(pixel + ivec2(0, inward.y)).normal - s.normal;
+    return turn_of(across, along);
+#endif
+}
+
 // How much alpha² grows where a sample stands for its share of a pixel in which the normal turns: Tokuyoshi & Kaplanyan
 // 2019, "Improved Geometric Specular Antialiasing", 2 sigma² = 1 / pi and at most 0.18. Shares shrink with the number of
 // samples, so the mean still converges; without, single samples would hit highlights that are smaller than a pixel.
@@ -25,10 +36,7 @@ float pixel_alpha_squared(Surface s, ivec2 pixel) {
     if (s.clearcoat > 0.0) sharpest = min(sharpest, s.clearcoat_roughness);
 #endif
     if (view.pixel_share == 0.0 || sharpest > 0.35) return 0.0;
-    ivec2 inward = ivec2(lessThan(vec2(pixel) * 2.0, view.size)) * 2 - 1;
-    vec3 across = read_planes(pixel + ivec2(inward.x, 0)).normal - s.normal;
-    vec3 along = read_planes(pixel + ivec2(0, inward.y)).normal - s.normal;
-    return view.pixel_share * min((dot(across, across) + dot(along, along)) / PI, 0.18);
+    return view.pixel_share * min(turn_at(s, pixel) / PI, 0.18);
 }
 #endif
 
@@ -37,6 +45,9 @@ flat in Light light;
 // What of each lobe a light may show: the environment pass shows a dome in the sharp ones.
 vec3 lobe_response(Light light, Surface s) {
     vec3 response = light.response.xyy;
+#ifdef PLANE_WEIGHTS
+    response *= s.weights.xyy;
+#endif
 #ifdef SKY
     if (light.is_sky == 0u) return response;
 #ifdef PLANE_CLEARCOAT

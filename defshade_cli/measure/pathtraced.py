@@ -127,8 +127,8 @@ def _placed(mesh: Mesh, world_from_object: Matrix) -> _Part:
 
 
 def _shown(material: Material, drawable: Drawable, row: int) -> Material:
-    if material.opacity < 1.0:
-        raise DefshadeError(f"{material.path}: path tracing takes opaque materials only")
+    if material.opacity_threshold > 0.0 or (material.uses_display_opacity and drawable.display_opacity[row] < 1.0):
+        raise DefshadeError(f"{material.path}: path tracing takes constant opacity without a threshold only")
     if not material.uses_display_color:
         return material
     return replace(material, diffuse_color=tuple(drawable.display_color[row].tolist()))
@@ -154,13 +154,14 @@ def _bsdf(material: Material) -> dict[str, Any]:
         f90 = 1.0 + (base - 1.0) * metallic
         dielectric = ((1.0 - material.ior) / (1.0 + material.ior)) ** 2 * f90
         f0 = dielectric + (f90 - dielectric) * metallic
-    scalars = ("roughness", "clearcoat", "clearcoat_roughness")
+    scalars = ("roughness", "clearcoat", "clearcoat_roughness", "opacity")
     return {
         "type": "preview_surface",
         "base": _vector(base),
         "f0": _vector(f0),
         "f90": _vector(f90),
         "metallic": float(metallic),
+        "is_transparent": material.is_transparent,
     } | {name: float(getattr(material, name)) for name in scalars}
 
 

@@ -121,7 +121,7 @@ class LightingPass:
             defines = variant.defines + ["VOLUME_QUAD"] * (volume == "quad")
             files = (f"light_{volume}.vert", "lighting.frag")
             program = gpu.shaders.program(*files, defines=defines, generated=generated)
-            self._volumes[volume] = screen.array(program) if volume == "quad" else _volume_array(gpu, volume, program)
+            self._volumes[volume] = screen.array(program) if volume == "quad" else volume_array(gpu, volume, program)
 
     def begin(self, gbuffer: GBuffer, targets: LightTargets) -> None:
         """Emission and coverage: the sample's radiance is overwritten, and the group of what is emitted grows."""
@@ -170,7 +170,8 @@ class LightingPass:
         array.render(instances=count)
 
 
-def _volume_array(gpu: Gpu, volume: Volume, program: moderngl.Program) -> moderngl.VertexArray:
+def volume_array(gpu: Gpu, volume: Volume, program: moderngl.Program) -> moderngl.VertexArray:
+    """The polyhedron around a sphere or a cone, for a program that reads its `corner`s."""
     corners, triangles = sphere_volume() if volume == "sphere" else cone_volume()
     vertices = gpu.keep(gpu.context.buffer(corners.tobytes()))
     indices = gpu.keep(gpu.context.buffer(triangles.tobytes()))
