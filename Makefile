@@ -6,6 +6,7 @@
 #   make docs    write docs/commands.md anew from the commands
 #   make tables  measure the layouts anew, for the table in docs/lighting.md
 #   make bench-reading  measure what reading a stage costs
+#   make bench   measure whole processes, ours and peers' in PEERS_PYTHON, into docs/performance.md
 #   make accuracy  measure accumulated light against Mitsuba 3, into docs/accuracy.md
 #   make error-check  compare the errors that renders claim with those that they have, into docs/accuracy.md
 #   make fuzz    render mutated stages and images in contained processes: 10,000, or COUNT=N, from SEED=N
@@ -14,6 +15,7 @@
 #   make conformance  lay stages by others beside their references, into build/conformance and docs/conformance.md
 #   make bench-farm  frames a second by the number of workers
 #   make farm-check  a batch of a thousand frames while workers die and the disk fills
+#   make gallery  render the documents' figures into docs/images
 #   make wheel   build dist/*.whl
 #   make clean   remove what was built, the virtual environment too
 
@@ -21,10 +23,15 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := demo
+<<<<<<< HEAD
 .PHONY: demo test lint docs tables bench-reading accuracy error-check stress fuzz kill-check conformance wheel clean
 .PHONY: farm-check bench-farm
+=======
+.PHONY: demo test lint docs tables bench bench-reading bench-farm accuracy error-check stress conformance gallery wheel clean farm-check
+>>>>>>> main
 
 PYTHON ?= python3
+PEERS_PYTHON ?= .venv/bin/python
 BIN := .venv/bin
 LIBRARIES := libEGL.so.1 libGL.so.1
 LIBRARY_PACKAGES := libegl1 libgl1 libgl1-mesa-dri
@@ -60,12 +67,16 @@ docs: .venv/.ready
 bench-reading: .venv/.ready
 	$(BIN)/python benchmarks/reading.py
 
+bench: .venv/.ready-reference
+	$(BIN)/python benchmarks/compare.py out/bench --python $(PEERS_PYTHON) --page docs/performance.md
+
 accuracy: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.accuracy docs/accuracy.md
 
 error-check: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.convergence docs/accuracy.md
 
+<<<<<<< HEAD
 COUNT ?= 10000
 SEED ?= 1
 fuzz: .venv/.ready
@@ -75,7 +86,11 @@ kill-check: .venv/.ready-dev
 	DEFSHADE_KILLS=200 $(BIN)/pytest -q tests/test_faults.py -k killed
 
 bench-farm: .venv/.ready
+=======
+bench-farm: .venv/.ready-dev
+>>>>>>> main
 	$(BIN)/python benchmarks/throughput.py
+	$(BIN)/python benchmarks/dask_scale.py
 
 farm-check: .venv/.ready-dev
 	$(BIN)/pytest -q -s -m slow tests/test_farm_scale.py
@@ -88,6 +103,9 @@ conformance: .venv/.ready
 
 tables: .venv/.ready
 	$(BIN)/python -m defshade_cli.measure.layouts docs/lighting.md
+
+gallery: .venv/.ready
+	$(BIN)/python -m defshade_cli.measure.gallery docs/images
 
 wheel: .venv/.ready
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .

@@ -18,6 +18,7 @@ import OpenImageIO as oiio
 import pytest
 
 from defshade_cli.image.reading import read
+from defshade_cli.resources import SCENES
 
 pytestmark = pytest.mark.slow
 
@@ -162,3 +163,31 @@ def test_a_second_run_renders_nothing_and_a_texture_its_own_frames(shots: Path) 
     assert finished("-o", "out/{scene}.#.exr", "--existing", "skip")[0] == 0
     touched = {path.name for path in Path("out").iterdir() if path.stat().st_mtime_ns != dates[path]}
     assert touched == {f"s{number:03}.{frame}.exr" for number in TEXTURED for frame in range(1, FRAMES + 1)}
+
+
+def test_forty_frames_four_ways(shots: Path) -> None:
+    """render, batch, Dask and Open Job Description, to the bit."""
+    openjd = shutil.which("openjd") or shutil.which("openjd", path=str(Path(sys.executable).parent))
+    if openjd is None:
+        pytest.skip("the openjd command is not installed")
+    shutil.copy(SCENES / "animated.usda", shots)
+    frames = ["animated.usda", "--frames", "1:40", "--size", "48x27", "--samples", "2"]
+    program = [sys.executable, "-m", "defshade_cli.cli"]
+    for folder, command in (
+        ("render", ["render", *frames]),
+        ("batch", ["batch", *frames, "--workers", "2"]),
+        ("dask", ["batch", *frames, "--engine", "dask", "--workers", "2"]),
+    ):
+        subprocess.run([*program, *command, "-o", f"{folder}/#.exr"], check=True, capture_output=True, timeout=600)
+    emitted = [*program, "batch", *frames, "-o", "openjd/#.exr", "--emit", "openjd"]
+    Path("job.yaml").write_text(subprocess.run(emitted, check=True, capture_output=True, text=True).stdout)
+    wrapper = shots / "defshade"
+    wrapper.write_text(f'#!/bin/sh\nexec {sys.executable} -m defshade_cli.cli "$@"\n')
+    wrapper.chmod(0o755)
+    run = [openjd, "run", "job.yaml", "--step", "Render1", "-p", f"Folder={shots}", "-p", f"Defshade={wrapper}"]
+    subprocess.run(run, check=True, capture_output=True, timeout=600)
+    ways = ("render", "batch", "dask", "openjd")
+    for number in range(1, 41):
+        first, *others = (read(Path(folder, f"{number}.exr"))["beauty"] for folder in ways)
+        for other in others:
+            np.testing.assert_array_equal(first, other)

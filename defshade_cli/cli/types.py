@@ -125,6 +125,17 @@ class OneOf(click.ParamType):
         return int(value)
 
 
+class Counts(click.ParamType):
+    """`1,4,16` → the whole numbers above 0, each once, ascending."""
+
+    name = "1,4,16"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, ...]:
+        if not re.fullmatch(r"\s*[1-9]\d*\s*(,\s*[1-9]\d*\s*)*", value):
+            self.fail(f"{value!r} is not a list of whole numbers above 0 such as 1,4,16", param, ctx)
+        return tuple(sorted({int(number) for number in value.split(",")}))
+
+
 class Names(click.ParamType):
     """Some of `choices`, separated by commas, each once; `all` for every one."""
 

@@ -45,7 +45,7 @@ class Reference:
 
 def path_traced(scene: Scene, plan: Plan, samples: int) -> Reference:
     """Render with `samples` a pixel. Raises DefshadeError for what the conversion does not know."""
-    world = mi.load_dict(_world(scene, plan))
+    world = mi.load_dict(mitsuba_world(scene, plan, {"type": "volpath", "max_depth": 2, "hide_emitters": True}))
     chunks = max(1, math.ceil(samples / 2 / _CHUNK))
     halves = [_mean(world, range(half * chunks, (half + 1) * chunks)) for half in (0, 1)]
     return Reference(np.stack(halves) * np.float32(plan.exposure))
@@ -58,8 +58,8 @@ def _mean(world: Any, seeds: range) -> NDArray[np.float32]:
     return (total / len(seeds)).astype(np.float32)
 
 
-def _world(scene: Scene, plan: Plan) -> dict[str, Any]:
-    integrator = {"type": "volpath", "max_depth": 2, "hide_emitters": True}
+def mitsuba_world(scene: Scene, plan: Plan, integrator: dict[str, Any]) -> dict[str, Any]:
+    """What Mitsuba's load_dict takes. Raises DefshadeError for what the conversion does not know."""
     world: dict[str, Any] = {"type": "scene", "integrator": integrator, "sensor": _sensor(plan)}
     for number, (material, part) in enumerate(_parts(scene)):
         world[f"part{number}"] = _mesh(f"part{number}", part, material)

@@ -40,6 +40,7 @@ from defshade_cli.usd.refiner import Refiner
 from defshade_cli.usd.said import Said, said_of
 from defshade_cli.usd.shapes import Shapes
 from defshade_cli.usd.sharing import shared
+from defshade_cli.usd.small_meshes import Shaped
 from defshade_cli.usd.subsets import FaceGroup, Faces, material_subsets, read_faces
 
 __all__ = ["FaceGroup", "Gprim", "Surface", "is_time_varying", "read_surface", "tessellate"]
@@ -147,14 +148,24 @@ def _elements(polygons: Polygons) -> Elements:
     return count_elements(whole * len(polygons.counts), len(polygons.points), whole * len(polygons.indices))
 
 
-def tessellate(surface: Surface, refiner: Refiner | None = None, last: Gprim | None = None) -> Gprim:
-    """The surface in triangles; without a refiner its cage. `last`: an earlier one, of which is kept what fits."""
-    refined = with_normals(refiner.refine(surface.polygons) if refiner else surface.polygons)
+def tessellate(
+    surface: Surface, refiner: Refiner | None = None, last: Gprim | None = None, shaped: Shaped | None = None
+) -> Gprim:
+    """The surface in triangles; without a refiner its cage.
+
+    last: an earlier one, of which is kept what fits.  shaped: what is known of polygons that are not refined.
+    """
+    if shaped:
+        refined = replace(surface.polygons, normals=shaped.normals)
+    else:
+        refined = with_normals(refiner.refine(surface.polygons) if refiner else surface.polygons)
     polygons = shared(refined, last.cut.polygons) if last else refined
     known = last.cut.moved(polygons, surface.faces) if last else None
-    made = known or cut(polygons, surface.faces, surface.path)
+    made = known or cut(polygons, surface.faces, surface.path, shaped and shaped.triangles)
     level = (refiner.level if refiner else 0) if surface.control else None
-    mesh = replace(made.mesh, double_sided=surface.double_sided, level=level)
+    mesh = made.mesh
+    if (mesh.double_sided, mesh.level) != (surface.double_sided, level):
+        mesh = replace(mesh, double_sided=surface.double_sided, level=level)
     return Gprim(mesh, made.groups, tuple(Unsupported(surface.path, issue) for issue in made.issues), made)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 
 from pxr import Sdf, Usd, UsdGeom
@@ -71,6 +71,7 @@ class Memory:
 
     def _read_surface(self, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Surface | None:
         subsets = material_subsets(prim)
+        self._bound(str(prim.GetPath()), said.names)
         surface = read_surface(
             prim,
             time,
@@ -112,16 +113,15 @@ class Memory:
         """Relationships do not vary over time."""
         return self._bound(str(path)).bindings
 
-    def _bound(self, path: str) -> Bound:
-        """From the nearest prim above whose bindings are known, downwards."""
+    def _bound(self, path: str, said: Collection[str] | None = None) -> Bound:
+        """From the nearest prim above whose bindings are known, downwards. said: of the prim, where it is known."""
         unknown = []
         while path not in self._bindings:
             unknown.append(path)
             path = path.rpartition("/")[0] or "/"
         bound = self._bindings[path]
         for below in reversed(unknown):
-            prim = self._stage.GetPrimAtPath(below)
-            self._bindings[below] = bound = read_bound(prim, bound, prim.GetAuthoredPropertyNames())
+            self._bindings[below] = bound = read_bound(self._stage, below, bound, said if below == unknown[0] else None)
         return bound
 
     def shown(self, path: Sdf.Path | str) -> str:

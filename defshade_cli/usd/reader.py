@@ -192,7 +192,7 @@ class StageReader:
         return found
 
     def _read_camera(
-        self, frame: float | None, time: Usd.TimeCode, placed: Iterable[PlacedSurface]
+        self, frame: float | None, time: Usd.TimeCode, placed: Sequence[PlacedSurface]
     ) -> tuple[Camera, tuple[Unsupported, ...]]:
         if self._framing:
             bounds = self._bounds_at_start if self._framing.turn else self._bounds(placed, time)
@@ -216,15 +216,16 @@ class StageReader:
         start = self.first_frame()
         time = Usd.TimeCode.Default() if start is None else Usd.TimeCode(start)
         pieces = Traversal(self._stage, self._memory, time, self._purposes, time, self._pass).read_stage()
-        return self._bounds(_surfaces(pieces, self._purposes), time)
+        return self._bounds(tuple(_surfaces(pieces, self._purposes)), time)
 
-    def _bounds(self, placed: Iterable[PlacedSurface], time: Usd.TimeCode) -> NDArray[np.float64]:
+    def _bounds(self, placed: Sequence[PlacedSurface], time: Usd.TimeCode) -> NDArray[np.float64]:
         """(2, 3) around the surfaces as authored, however they are refined, empty ones too."""
-        standing: dict[bytes, list[NDArray[np.float64]]] = defaultdict(list)
-        for piece, surface in placed:
-            standing[extent_of(self._stage, surface, time).tobytes()].append(piece.root_from_object)
-        extents = ((np.frombuffer(extent).reshape(2, 3), matrices) for extent, matrices in standing.items())
-        return enclose(world_boxes(extent, _joined(matrices)) for extent, matrices in extents)
+        boxes = [
+            np.broadcast_to(extent_of(self._stage, surface, time), (len(piece.root_from_object), 2, 3))
+            for piece, surface in placed
+        ]
+        matrices = np.concatenate([np.empty((0, 4, 4)), *(piece.root_from_object for piece, _ in placed)])
+        return enclose([world_boxes(np.concatenate([np.empty((0, 2, 3)), *boxes]), matrices)])
 
     def _lit(self, scene: Scene) -> Scene:
         """The scene with lights of ours where it has none: the studio, or one at the camera as usdrecord has it."""
@@ -246,10 +247,9 @@ class StageReader:
         view = View(camera.conformed(aspect, self._settings.conform), height)
         placed = ((surface, piece.root_from_object) for piece, surface in drawn)
         chosen = choose_levels(placed, self._complexity, view)
-        return {
-            surface: self._tessellation.at_level(surface, levels.setdefault(surface.path, level))
-            for surface, level in chosen.items()
-        }
+        return self._tessellation.at_levels(
+            {surface: levels.setdefault(surface.path, level) for surface, level in chosen.items()}
+        )
 
 
 def _surfaces(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[PlacedSurface]:
@@ -296,7 +296,7 @@ def _drawable(mesh: int, subsets: tuple[Subset, ...], pieces: Sequence[Piece], u
         paths=tuple(path for piece in pieces for path in piece.paths),
         instance_ids=_joined([piece.ids for piece in pieces]),
         display_color=np.where(np.isnan(color), unauthored.diffuse_color, color),
-        display_opacity=np.nan_to_num(opacity, nan=unauthored.opacity),
+        display_opacity=np.where(np.isnan(opacity), unauthored.opacity, opacity),
     )
 
 
