@@ -23,12 +23,8 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := demo
-<<<<<<< HEAD
-.PHONY: demo test lint docs tables bench-reading accuracy error-check stress fuzz kill-check conformance wheel clean
-.PHONY: farm-check bench-farm
-=======
-.PHONY: demo test lint docs tables bench bench-reading bench-farm accuracy error-check stress conformance gallery wheel clean farm-check
->>>>>>> main
+.PHONY: demo test lint docs tables bench bench-reading bench-farm accuracy error-check stress conformance gallery
+.PHONY: fuzz kill-check farm-check wheel clean
 
 PYTHON ?= python3
 PEERS_PYTHON ?= .venv/bin/python
@@ -76,7 +72,6 @@ accuracy: .venv/.ready-reference
 error-check: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.convergence docs/accuracy.md
 
-<<<<<<< HEAD
 COUNT ?= 10000
 SEED ?= 1
 fuzz: .venv/.ready
@@ -85,10 +80,7 @@ fuzz: .venv/.ready
 kill-check: .venv/.ready-dev
 	DEFSHADE_KILLS=200 $(BIN)/pytest -q tests/test_faults.py -k killed
 
-bench-farm: .venv/.ready
-=======
 bench-farm: .venv/.ready-dev
->>>>>>> main
 	$(BIN)/python benchmarks/throughput.py
 	$(BIN)/python benchmarks/dask_scale.py
 

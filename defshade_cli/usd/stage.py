@@ -14,7 +14,7 @@ from pxr import Usd, UsdGeom, UsdUtils
 
 from defshade_cli.settings import Composition
 from defshade_cli.usd.composition import compose
-from defshade_cli.usd.diagnostics import commentary, described
+from defshade_cli.usd.diagnostics import commentary
 from defshade_cli.usd.materialx.documents import is_about_documents, supply_documents
 from defshade_cli.usd.unresolved import find_unresolved, summary
 
