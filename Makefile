@@ -9,6 +9,8 @@
 #   make bench   measure whole processes, ours and peers' in PEERS_PYTHON, into docs/performance.md
 #   make accuracy  measure accumulated light against Mitsuba 3, into docs/accuracy.md
 #   make error-check  compare the errors that renders claim with those that they have, into docs/accuracy.md
+#   make fuzz    render mutated stages and images in contained processes: 10,000, or COUNT=N, from SEED=N
+#   make kill-check  kill renders at 200 random moments
 #   make stress  render the corners of the arithmetic, into docs/stability.md
 #   make conformance  lay stages by others beside their references, into build/conformance and docs/conformance.md
 #   make bench-farm  frames a second by the number of workers
@@ -21,7 +23,8 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lint docs tables bench bench-reading bench-farm accuracy error-check stress conformance gallery wheel clean farm-check
+.PHONY: demo test lint docs tables bench bench-reading bench-farm accuracy error-check stress conformance gallery
+.PHONY: fuzz kill-check farm-check wheel clean
 
 PYTHON ?= python3
 PEERS_PYTHON ?= .venv/bin/python
@@ -68,6 +71,14 @@ accuracy: .venv/.ready-reference
 
 error-check: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.convergence docs/accuracy.md
+
+COUNT ?= 10000
+SEED ?= 1
+fuzz: .venv/.ready
+	$(BIN)/python -m defshade_cli.measure.fuzz $(COUNT) $(SEED)
+
+kill-check: .venv/.ready-dev
+	DEFSHADE_KILLS=200 $(BIN)/pytest -q tests/test_faults.py -k killed
 
 bench-farm: .venv/.ready-dev
 	$(BIN)/python benchmarks/throughput.py

@@ -7,10 +7,12 @@
     │   ├── PrimNotFound      a camera, settings or mask path that the stage lacks
     │   └── EmptyStage        nothing to draw
     ├── GpuError          4   no context, a driver limit, out of memory
+    │   ├── GpuMemoryError    a target that does not fit
     │   └── ShaderError       a shader that does not compile, as file:line
     ├── OutputError       5   a file that cannot be written or read back
     │   └── UnsoundImage      it is written, and holds values that are no numbers
-    └── BatchError        6   some frames of a batch failed
+    ├── BatchError        6   some frames of a batch failed
+    └── ContainedError        of a process of its own: the code that it would have here, 6 where that process is lost
 
 A bug asserts; a failure at run time raises one of these; an expected outcome is a return value.
 The command line prints `str(error)`, one sentence, and ends with `error.exit_code`.
@@ -49,6 +51,10 @@ class GpuError(DefshadeError):
     exit_code = 4
 
 
+class GpuMemoryError(GpuError):
+    pass
+
+
 class ShaderError(GpuError):
     pass
 
@@ -63,3 +69,11 @@ class UnsoundImage(OutputError):
 
 class BatchError(DefshadeError):
     exit_code = 6
+
+
+class ContainedError(DefshadeError):
+    """A frame that failed in a process of its own, with the exit code that it would have had here."""
+
+    def __init__(self, message: str, exit_code: int) -> None:
+        super().__init__(message)
+        self.exit_code = exit_code

@@ -145,3 +145,11 @@ def test_a_file_that_came_from_elsewhere_keeps_its_name(tmp_path: Path) -> None:
     (tmp_path / "shot.v012.usda").write_text(CUBE)
     shutil.copy(tmp_path / "shot.v012.usda", tmp_path / "copy.usda")
     assert stage_name(open_stage(tmp_path / "shot.v012.usda")) == "shot.v012"
+
+
+def test_a_layer_of_bytes_that_are_no_text_is_one_sentence(tmp_path: Path) -> None:
+    """USD quotes such bytes, and its message can then not be had as text."""
+    path = tmp_path / "odd.usda"
+    path.write_bytes(b'#usda 1.0\ndef Sphere "b\xec\xa0ll" {\n  double \xb0radius = 1\n}\n')
+    with pytest.raises(StageNotFound, match="is not a USD stage: it holds what is no text"):
+        open_stage(path)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import struct
+import zlib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -345,3 +347,17 @@ def test_a_texture_inside_a_package_is_drawn(pipeline: Pipeline, assets: Path) -
     assert texture.tiles[0][1].contents
     albedo = layer(pipeline, read, "albedo", 64)
     assert len(np.unique(albedo.reshape(-1, 3), axis=0)) > 50
+
+
+def test_a_header_that_claims_100000_texels_a_side_is_a_warning(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = chunk(b"IHDR", struct.pack(">IIBBBBB", 100_000, 100_000, 8, 2, 0, 0, 0))
+    body = chunk(b"IDAT", zlib.compress(bytes(999))) + chunk(b"IEND", b"")
+    (tmp_path / "huge.png").write_bytes(b"\x89PNG\r\n\x1a\n" + header + body)
+    assert load_images([Source(ImageFile(str(tmp_path / "huge.png")), "auto")]) == {}
+    assert "exceeds the 8192 MB limit" in caplog.text
+    assert "\n" not in caplog.records[0].getMessage()

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import functools
 import shlex
-import signal
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from defshade_cli.cli.arguments import option_arguments
+from defshade_cli.cli.ending import ended_by_sigterm
 from defshade_cli.cli.jobfile import JOB_SUFFIXES, read_job_file
 from defshade_cli.cli.options import (
     Function,
@@ -39,8 +37,6 @@ if TYPE_CHECKING:
     from defshade_cli.farm.dask import DaskEngine
     from defshade_cli.farm.local import LocalEngine
     from defshade_cli.farm.tasks import Chunk
-
-TERMINATED = 143  # 128 + SIGTERM, as shells have it
 
 _EPILOG = epilog(
     "defshade batch shots/*.usda --frames 1:240 -o 'renders/{scene}/{scene}.####.exr'",
@@ -172,6 +168,8 @@ def batch(jobs: Sequence[RenderJob], reporting: Reporting, schedule: Schedule) -
 
     if schedule.engine != "dask" and (schedule.scheduler or schedule.resources):
         raise UsageError("--scheduler and --resource are for --engine dask")
+    if schedule.engine == "dask" and (reporting.memory_limit or reporting.timeout):
+        raise UsageError("--memory-limit and --timeout are for --engine local")
     start_logging(reporting)
     check_batch(jobs)
     frames = frame_count(jobs)
@@ -183,7 +181,7 @@ def batch(jobs: Sequence[RenderJob], reporting: Reporting, schedule: Schedule) -
         for chunk in chunks:
             click.echo(_task_line(chunk))
     else:
-        with _ended_by_sigterm():
+        with ended_by_sigterm():
             _render(jobs, chunks, workers, reporting, schedule)
 
 
@@ -210,12 +208,14 @@ def _render(
 
 def _make_engine(workers: int, reporting: Reporting, schedule: Schedule) -> LocalEngine | DaskEngine:
     from defshade_cli.farm.dask import DaskEngine
+    from defshade_cli.farm.limits import Limits
     from defshade_cli.farm.local import LocalEngine
 
     level = "INFO" if reporting.verbose else "WARNING"
     command = shlex.join(["defshade", *sys.argv[1:]])
     if schedule.engine == "local":
-        return LocalEngine(workers, command=command, log_level=level)
+        limits = Limits(reporting.memory_limit, reporting.timeout)
+        return LocalEngine(workers, command=command, log_level=level, limits=limits)
     resources = dict(schedule.resources)
     engine = DaskEngine(schedule.scheduler, workers, resources=resources, command=command, log_level=level)
     if not reporting.quiet:
@@ -238,17 +238,3 @@ def _task_line(chunk: Chunk) -> str:
     frames = ",".join(frame_name(frame) for frame in job.frames) or "first frame"
     camera = f"  camera {job.camera}" if job.camera else ""
     return f"{job.stage}{camera}  frames {frames}  → {', '.join(job.output.patterns or (job.output.fallback,))}"
-
-
-@contextmanager
-def _ended_by_sigterm() -> Iterator[None]:
-    """Leave the block in order when the process is asked to end."""
-
-    def leave(_signal: int, _frame: FrameType | None) -> None:
-        sys.exit(TERMINATED)
-
-    before = signal.signal(signal.SIGTERM, leave)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

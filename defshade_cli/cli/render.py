@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from defshade_cli.cli.contained import execute_contained
+from defshade_cli.cli.ending import ended_by_sigterm
 from defshade_cli.cli.options import HeadedCommand, Reporting, epilog, takes_job
 from defshade_cli.cli.progress import frame_name, make_progress, start_logging
 from defshade_cli.cli.stats import Stats
@@ -44,8 +46,11 @@ def execute(job: RenderJob, reporting: Reporting) -> None:
     from defshade_cli.rendering import run
 
     start_logging(reporting)
+    if reporting.contained:
+        execute_contained(job, reporting)
+        return
     frames = max(1, len(job.frames))
-    with make_progress(reporting, frames) as progress, Stats(job, reporting.stats) as stats:
+    with ended_by_sigterm(), make_progress(reporting, frames) as progress, Stats(job, reporting.stats) as stats:
         for result in run(job, command=shlex.join(["defshade", *sys.argv[1:]])):
             progress.frame(result)
             stats.add(result)

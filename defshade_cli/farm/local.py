@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
@@ -21,6 +22,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from defshade_cli.farm.limits import INTERVAL, Limits
 from defshade_cli.farm.tasks import Chunk, Outcome, failed, joined
 
 BYTES_PER_WORKER = 3 << 29
@@ -29,16 +31,27 @@ BYTES_PER_WORKER = 3 << 29
 _PATIENCE = 5.0  # seconds that a worker has to end when asked
 
 
+NO_LIMITS = Limits()
+
+
 class LocalEngine:
     """An Engine of up to `workers` processes; a context manager that ends them.
 
     threads: of the software driver, a worker; None shares the cores evenly. LP_NUM_THREADS in the environment wins.
     command: goes into the files' headers.  log_level: of the workers' logs.
+    limits: of a frame; a worker that passes one is killed.
     """
 
     def __init__(
-        self, workers: int, *, threads: int | None = None, command: str = "", log_level: str = "WARNING"
+        self,
+        workers: int,
+        *,
+        threads: int | None = None,
+        command: str = "",
+        log_level: str = "WARNING",
+        limits: Limits = NO_LIMITS,
     ) -> None:
+        self._limits = limits
         self._limit = workers
         self._threads = threads or max(1, core_count() // workers)
         self._arguments = (command, log_level)
@@ -63,8 +76,11 @@ class LocalEngine:
     def outcomes(self) -> Iterator[Outcome]:
         while self._queue or self._busy():
             self._dispatch()
-            for connection in wait([worker.connection for worker in self._busy()]):
+            patience = INTERVAL if self._limits else None
+            for connection in wait([worker.connection for worker in self._busy()], patience):
                 yield from self._heard(next(w for w in self._workers if w.connection is connection))
+            for worker in self._busy():
+                worker.watch(self._limits)
 
     def _busy(self) -> list[_Worker]:
         return [worker for worker in self._workers if worker.pending]
@@ -85,7 +101,7 @@ class LocalEngine:
         except (EOFError, OSError):
             yield from self._bury(worker)
             return
-        worker.pending.popleft()
+        worker.answered()
         yield replace(outcome, log=worker.read_log())
 
     def _bury(self, worker: _Worker) -> list[Outcome]:
@@ -107,6 +123,7 @@ class _Worker:
         self.pending: deque[Chunk] = deque()
         self._log = tempfile.TemporaryFile()  # noqa: SIM115  lives as long as the worker
         self._read = 0
+        self._began, self._killed_for = 0.0, ""
         self.connection, theirs = Pipe()
         with theirs:
             command = [sys.executable, "-m", "defshade_cli.farm.worker", str(theirs.fileno()), *arguments]
@@ -122,9 +139,21 @@ class _Worker:
 
     def take(self, chunk: Chunk) -> None:
         """Send the chunk. That the process is dead is found out where its answer is awaited."""
+        self._began = time.monotonic()
         self.pending.extend(chunk.split())
         with suppress(OSError):
             self.connection.send(chunk)
+
+    def answered(self) -> None:
+        """A frame is done; the next one begins."""
+        self.pending.popleft()
+        self._began = time.monotonic()
+
+    def watch(self, limits: Limits) -> None:
+        """Kill the process where its frame takes more than it may; the connection then says that it is dead."""
+        if not self._killed_for and (reason := limits.passed_by(self.process.pid, self._began)):
+            self._killed_for = reason
+            self.process.kill()
 
     def end(self) -> str:
         """Wait for the process, by force in the end. Returns how it ended."""
@@ -134,7 +163,7 @@ class _Worker:
         except subprocess.TimeoutExpired:
             self.process.kill()
             status = self.process.wait()
-        return f"its worker process {_ending(status)}"
+        return self._killed_for or f"its worker process {_ending(status)}"
 
     def read_log(self) -> str:
         """What was logged since the last time."""

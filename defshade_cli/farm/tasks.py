@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from defshade_cli.errors import UsageError
+from defshade_cli.errors import BatchError, UsageError
 from defshade_cli.farm.shots import Shot, make_shot
 from defshade_cli.farm.targets import check_outputs, remove_leftovers, shot_files
 from defshade_cli.scene.product import Product
@@ -41,6 +41,7 @@ class Outcome:
 
     frame: time code; None for the default time, and where a stage's first frame is not known for an error.
     seconds: wall time per step.  error: one sentence where the frame failed, else empty.
+    exit_code: what its error would end `render` with.
     log: what the worker wrote to its stdout and stderr meanwhile.
     """
 
@@ -50,6 +51,7 @@ class Outcome:
     skipped: bool = False
     seconds: dict[str, float] = field(default_factory=dict)
     error: str = ""
+    exit_code: int = 0
     log: str = ""
 
     @property
@@ -57,9 +59,9 @@ class Outcome:
         return self.task.job.stage
 
 
-def failed(task: Chunk, error: str) -> Outcome:
-    """The outcome of a frame that came to nothing."""
-    return Outcome(task, next(iter(task.job.frames), None), error=error)
+def failed(task: Chunk, error: str, exit_code: int = BatchError.exit_code) -> Outcome:
+    """The outcome of a frame that came to nothing; without an exit code of its own, that of a worker that is lost."""
+    return Outcome(task, next(iter(task.job.frames), None), error=error, exit_code=exit_code)
 
 
 def joined(tasks: Sequence[Chunk]) -> Chunk:

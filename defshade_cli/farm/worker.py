@@ -38,7 +38,7 @@ def render_chunk(chunk: Chunk, renderer: Renderer, command: str) -> Iterator[Out
                 task = pending.pop(0)
                 yield Outcome(task, result.frame, result.paths, result.skipped, result.seconds)
         except DefshadeError as error:
-            yield failed(pending.pop(0), str(error))
+            yield failed(pending.pop(0), str(error), error.exit_code)
             if isinstance(error, GpuError):
                 renderer.close()
 

@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.errors import GpuError
+from defshade_cli.errors import GpuError, GpuMemoryError
 from defshade_cli.gpu.context import Gpu
 
 _READ_DTYPE = {"f1": np.uint8, "f2": np.float16, "f4": np.float32, "u4": np.uint32}
@@ -48,15 +48,19 @@ def allocate(
 ) -> Target:
     """A target of (width, height) with one texture a name, each (components, dtype f1|f2|f4).
 
-    Raises GpuError where the size is past the driver's limit or memory ends.
+    Raises GpuError where the size is past the driver's limit, GpuMemoryError where memory ends.
     """
     if max(size) > gpu.max_size:
         raise GpuError(f"{size[0]}x{size[1]} is past this driver's limit of {gpu.max_size} pixels a side")
+    textures: dict[str, moderngl.Texture] = {}
     try:
-        textures = {name: gpu.context.texture(size, n, dtype=dtype) for name, (n, dtype) in formats.items()}
+        for name, (n, dtype) in formats.items():
+            textures[name] = gpu.context.texture(size, n, dtype=dtype)
         framebuffer = gpu.context.framebuffer(list(textures.values()), depth)
     except moderngl.Error as error:
-        raise GpuError(f"cannot allocate a target of {size[0]}x{size[1]}: {error}") from error
+        for texture in textures.values():
+            texture.release()
+        raise GpuMemoryError(f"no memory for a target of {size[0]}x{size[1]} ({error})") from error
     for texture in textures.values():
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
     return Target(framebuffer, textures, depth)

@@ -42,6 +42,9 @@ class Source(NamedTuple):
     color_space: ColorSpace
 
 
+oiio.attribute("limits:imagesize_MB", 8192)  # a header may claim anything; OpenImageIO's own limit is half the RAM
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class TexelImage:
     """texels: (H, W, C) uint8 or float16, row 0 at the bottom; C is 1 (r = g = b, a = 1) or 4.
@@ -176,7 +179,7 @@ def _opened(file: ImageFile) -> Iterator[oiio.ImageInput]:
         as_stored.attribute("oiio:UnassociatedAlpha", 1)
         image = oiio.ImageInput.open(path, as_stored)
         if image is None:
-            raise OSError(oiio.geterror().strip())
+            raise OSError(oiio.geterror().strip().partition("\n")[0])
         try:
             yield image
         finally:

@@ -60,6 +60,11 @@ class Pipeline:
         self._debug_volumes_pass = cache(lambda: DebugVolumesPass(gpu))
         self._stopping = Stopping(gpu, self._frame, self._screen, self._mask)
 
+    @property
+    def largest_side(self) -> int:
+        """Pixels a side that the driver can draw at once."""
+        return self._gpu.max_size
+
     def upload(self, scene: Scene, plan: Plan) -> DrawList:
         """The scene on the GPU, when all of it has arrived. Raises GpuError."""
         self._gpu.make_current()

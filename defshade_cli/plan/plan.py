@@ -94,6 +94,13 @@ class Plan:
         """(width, height) of what is rendered, in pixels."""
         return self.window.size
 
+    def within(self, window: DataWindow) -> Plan:
+        """The plan of a part of what is rendered, with its share of the time."""
+        camera = replace(self.camera, window=window.of(self.display_camera.window, self.display))
+        share = window.width * window.height / (self.window.width * self.window.height)
+        limit = None if self.time_limit is None else self.time_limit * share
+        return replace(self, window=window, camera=camera, time_limit=limit)
+
     @property
     def lit(self) -> bool:
         """Does any layer need the lighting?"""

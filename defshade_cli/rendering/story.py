@@ -18,13 +18,15 @@ from defshade_cli.farm.targets import FINGERPRINT, check_outputs, is_done, remov
 from defshade_cli.image.files import write
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import BEAUTY
-from defshade_cli.plan import Plan, make_plan, plan_moments
+from defshade_cli.plan import Plan, ShutterSample, make_plan, plan_moments
+from defshade_cli.rendering import tiles
 from defshade_cli.rendering.pictures import shown
 from defshade_cli.rendering.renderer import Renderer
 from defshade_cli.rendering.results import FrameResult, ImageResult
 from defshade_cli.rendering.soundness import sound
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Composition, OutputSettings, RenderJob, RenderSettings
+from defshade_cli.usd.reader import StageReader
 
 _FOR_FILES = ("check", "show", "write")
 """Steps that turn a film into files."""
@@ -173,8 +175,7 @@ def _draw(shot: Shot, opened: OpenJob, renderer: Renderer, command: str) -> _Dra
     with _timed(seconds, "upload"):
         uploaded = pipeline.upload(scene, plan)
     with _timed(seconds, "draw"):
-        moments = plan_moments(plan, reader.read_shutter(scene, plan.moments), job.settings)
-        film = pipeline.render(scene, plan, moments, uploaded)
+        film = tiles.render(pipeline, scene, plan, lambda: _moments(scene, plan, reader, job.settings), uploaded)
     with _timed(seconds, "check"):
         checked = sound(film, scene, job.settings, pipeline, job.output.on_nan)
     with _timed(seconds, "show"):
@@ -184,6 +185,10 @@ def _draw(shot: Shot, opened: OpenJob, renderer: Renderer, command: str) -> _Dra
         facts |= {FINGERPRINT: made_of}
     fault = checked.fault if job.output.on_nan == "error" else ""
     return _Drawn(shot, replace(film, metadata=facts), plan, seconds, fault)
+
+
+def _moments(scene: Scene, plan: Plan, reader: StageReader, settings: RenderSettings) -> Iterator[ShutterSample]:
+    return plan_moments(plan, reader.read_shutter(scene, plan.moments), settings)
 
 
 def _provenance(shot: Shot, scene: Scene, command: str) -> dict[str, Any]:

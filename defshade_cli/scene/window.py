@@ -35,6 +35,14 @@ class DataWindow:
     def size(self) -> tuple[int, int]:
         return self.width, self.height
 
+    def tiles(self, side: int) -> list[DataWindow]:
+        """The same pixels in windows of at most `side` pixels a side, row by row."""
+        return [
+            DataWindow(x, y, min(side, self.x + self.width - x), min(side, self.y + self.height - y))
+            for y in range(self.y, self.y + self.height, side)
+            for x in range(self.x, self.x + self.width, side)
+        ]
+
     def of(self, window: Window, display: tuple[int, int]) -> Window:
         """The part of a camera's (left, right, bottom, top) that these pixels of a `display` see."""
         left, right, bottom, top = window

@@ -8,6 +8,7 @@ from pxr import Sdf, Tf, Usd
 
 from defshade_cli.errors import StageNotFound
 from defshade_cli.settings import Composition
+from defshade_cli.usd.diagnostics import commentary
 from defshade_cli.usd.mask import add_what_is_referred_to, limited_to
 from defshade_cli.usd.variants import choose_variant
 
@@ -52,4 +53,4 @@ def _session(paths: tuple[Path, ...]) -> Sdf.Layer:
 
 
 def _first_line(error: Tf.ErrorException) -> str:
-    return str(error.args[0].commentary).strip().partition("\n")[0]
+    return commentary(error.args[0]).partition("\n")[0]

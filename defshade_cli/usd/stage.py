@@ -14,6 +14,7 @@ from pxr import Usd, UsdGeom, UsdUtils
 
 from defshade_cli.settings import Composition
 from defshade_cli.usd.composition import compose
+from defshade_cli.usd.diagnostics import commentary
 from defshade_cli.usd.materialx.documents import is_about_documents, supply_documents
 from defshade_cli.usd.unresolved import find_unresolved, summary
 
@@ -52,7 +53,7 @@ def gathered_diagnostics() -> Iterator[set[str]]:
         yield told
     finally:
         for kind in delegate.TakeCoalescedDiagnostics():
-            complaints = [_ADDRESS.sub("", item.commentary).strip() for item in kind.unsharedItems]
+            complaints = [_ADDRESS.sub("", commentary(item)) for item in kind.unsharedItems]
             first, *more = [text for text in complaints if _core(text) not in told] or [""]
             if first:
                 log.warning("USD: %s%s", first, f" (and {len(more)} more like it)" if more else "")

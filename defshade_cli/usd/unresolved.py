@@ -9,6 +9,7 @@ from typing import NamedTuple
 from pxr import Usd
 
 from defshade_cli.scene.scene import Unsupported
+from defshade_cli.usd.diagnostics import described
 
 _MOST_NAMED = 6
 
@@ -27,7 +28,7 @@ class Unresolved(NamedTuple):
 
 def find_unresolved(stage: Usd.Stage) -> tuple[Unresolved, ...]:
     """What USD could not compose of the stage as it is populated now, in the order of the prims."""
-    found = ((str(error.rootSite.path), str(error).strip()) for error in stage.GetCompositionErrors())
+    found = ((str(error.rootSite.path), described(error)) for error in stage.GetCompositionErrors())
     return tuple(Unresolved(prim, text, _reason(text)) for prim, text in sorted(found))
 
 

@@ -14,7 +14,7 @@ float coverage_of(Material material, Surface s, float NoV) {
 // A coin a sample, so that the mean is sorted blending. Each triangle has its own: a closed mesh lies behind itself.
 bool is_cut_out(float coverage, uint instance, uint material) {
     if (coverage <= 0.0 || coverage >= 1.0) return coverage <= 0.0;
-    uvec2 pixel = uvec2(gl_FragCoord.xy);
+    uvec2 pixel = uvec2(ivec2(gl_FragCoord.xy) + ivec2(view.origin)); // parts of an image fall as the whole does
     uvec4 seed = uvec4(pixel.x | pixel.y << 16u, instance, material, uint(gl_PrimitiveID));
     return coverage <= owen_van_der_corput(view.sample_index, seed);
 }

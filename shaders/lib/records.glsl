@@ -6,6 +6,7 @@ struct View {
     vec4 window;               // left, right, bottom, top on the plane one unit ahead
     vec2 depth_coefficients;   // camera depth z: 1 / z (perspective) or z (orthographic) = x * stored + y
     vec2 size;                 // pixels
+    vec2 origin;               // of the first pixel in the display window
     float exposure;
     uint sample_index;
     float pixel_share;         // of a pixel, that a sample stands for; 0 in a frame of one sample

@@ -15,12 +15,23 @@ PROGRESS = ("auto", "bar", "alf", "openjd", "json", "none")
 
 @dataclass(frozen=True, slots=True)
 class Reporting:
-    """How a command speaks while it works. stats: file of the record, None for none."""
+    """How a command works and speaks.
+
+    stats: file of the record, None for none.
+    isolate: in a process of its own.  memory_limit: MiB of that process.  timeout: seconds that a frame may take it.
+    """
 
     progress: str = "auto"
     stats: Path | None = None
     quiet: bool = False
     verbose: bool = False
+    isolate: bool = False
+    memory_limit: int | None = None
+    timeout: float | None = None
+
+    @property
+    def contained(self) -> bool:
+        return self.isolate or self.memory_limit is not None or self.timeout is not None
 
 
 def run_options() -> list[Function]:
@@ -46,6 +57,23 @@ def run_options() -> list[Function]:
             default_text="auto",
             help="How to tell progress on stderr: auto is a bar on a terminal and else a line a frame, "
             "alf is Tractor's, openjd Open Job Description's.",
+        ),
+        option(
+            "--isolate",
+            is_flag=True,
+            help="Render in a process of its own, so that a crash of a library is an error; batch always does.",
+        ),
+        option(
+            "--memory-limit",
+            type=click.IntRange(min=1),
+            metavar="MIB",
+            help="Give a frame up whose process holds more memory than this; implies --isolate.",
+        ),
+        option(
+            "--timeout",
+            type=click.FloatRange(min=0.0, min_open=True),
+            metavar="SECONDS",
+            help="Give a frame up that takes longer than this, reading and writing included; implies --isolate.",
         ),
         option("-q", "--quiet", is_flag=True, help="No progress, no warnings: results and errors only."),
         option("-v", "--verbose", is_flag=True, help="Log what is done and decided."),
