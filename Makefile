@@ -6,10 +6,13 @@
 #   make docs    write docs/commands.md anew from the commands
 #   make tables  measure the layouts anew, for the table in docs/lighting.md
 #   make bench-reading  measure what reading a stage costs
+#   make bench   measure whole processes, ours and peers' in PEERS_PYTHON, into docs/performance.md
 #   make accuracy  measure accumulated light against Mitsuba 3, into docs/accuracy.md
 #   make error-check  compare the errors that renders claim with those that they have, into docs/accuracy.md
 #   make stress  render the corners of the arithmetic, into docs/stability.md
 #   make conformance  lay stages by others beside their references, into build/conformance and docs/conformance.md
+#   make bench-farm  frames a second by the number of workers
+#   make farm-check  a batch of a thousand frames while workers die and the disk fills
 #   make wheel   build dist/*.whl
 #   make clean   remove what was built, the virtual environment too
 
@@ -17,9 +20,10 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lint docs tables bench-reading accuracy error-check stress conformance wheel clean
+.PHONY: demo test lint docs tables bench bench-reading bench-farm accuracy error-check stress conformance wheel clean farm-check
 
 PYTHON ?= python3
+PEERS_PYTHON ?= .venv/bin/python
 BIN := .venv/bin
 LIBRARIES := libEGL.so.1 libGL.so.1
 LIBRARY_PACKAGES := libegl1 libgl1 libgl1-mesa-dri
@@ -55,11 +59,21 @@ docs: .venv/.ready
 bench-reading: .venv/.ready
 	$(BIN)/python benchmarks/reading.py
 
+bench: .venv/.ready-reference
+	$(BIN)/python benchmarks/compare.py out/bench --python $(PEERS_PYTHON) --page docs/performance.md
+
 accuracy: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.accuracy docs/accuracy.md
 
 error-check: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.convergence docs/accuracy.md
+
+bench-farm: .venv/.ready-dev
+	$(BIN)/python benchmarks/throughput.py
+	$(BIN)/python benchmarks/dask_scale.py
+
+farm-check: .venv/.ready-dev
+	$(BIN)/pytest -q -s -m slow tests/test_farm_scale.py
 
 stress: .venv/.ready
 	$(BIN)/python -m defshade_cli.measure.stress docs/stability.md

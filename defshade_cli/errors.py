@@ -9,6 +9,7 @@
     ├── GpuError          4   no context, a driver limit, out of memory
     │   └── ShaderError       a shader that does not compile, as file:line
     ├── OutputError       5   a file that cannot be written or read back
+    │   └── UnsoundImage      it is written, and holds values that are no numbers
     └── BatchError        6   some frames of a batch failed
 
 A bug asserts; a failure at run time raises one of these; an expected outcome is a return value.
@@ -54,6 +55,10 @@ class ShaderError(GpuError):
 
 class OutputError(DefshadeError):
     exit_code = 5
+
+
+class UnsoundImage(OutputError):
+    pass
 
 
 class BatchError(DefshadeError):

@@ -13,17 +13,21 @@ Existing = Literal["overwrite", "skip", "error"]
 Complexity = Literal["auto", "low", "medium", "high", "veryhigh"]
 Filter = Literal["box", "gaussian", "blackman-harris"]
 Payloads = Literal["all", "none"]
+OnNan = Literal["error", "warn", "fill"]
 Compression = Literal["zip", "zips", "piz", "dwaa", "none"]
 Bits = Literal[8, 16]
+Debug = Literal["volumes"]
 
 LAYOUTS: tuple[Layout, ...] = ("rgba8", "packed", "float")
 SHADINGS: tuple[Shading, ...] = ("preview-surface", "classic")
 EXISTING: tuple[Existing, ...] = ("overwrite", "skip", "error")
 COMPLEXITIES: tuple[Complexity, ...] = ("auto", "low", "medium", "high", "veryhigh")
 PAYLOADS: tuple[Payloads, ...] = ("all", "none")
+ON_NAN: tuple[OnNan, ...] = ("error", "warn", "fill")
 COMPRESSIONS: tuple[Compression, ...] = ("zip", "zips", "piz", "dwaa", "none")
 FILTERS: dict[Filter, float] = {"box": 1.0, "gaussian": 2.0, "blackman-harris": 3.0}
 """Widths in pixels, from end to end, where none is asked: those of Arnold."""
+DEBUGS: tuple[Debug, ...] = ("volumes",)
 BITS: tuple[Bits, ...] = (8, 16)
 MOST_SAMPLES = 4096
 """Of a render that the error or the time ends."""
@@ -107,6 +111,11 @@ class RenderSettings:
     exposure: stops added to the camera's own.
     shadows: False lights every surface that faces a light.
     complexity: how finely subdivision surfaces are refined: by their size in the image, or 0 to 3 levels all alike.
+    fit: a camera of ours sees all of the stage, whatever cameras it has.
+    turntable: frames in which one goes around it, from frame 1 on; None for none.
+    direction: (azimuth, elevation) in degrees from where these two look; None for scene.framing's.
+    studio: a stage without lights gets those of scene/studio.py in place of one at the camera.
+    debug: what is drawn over the beauty: the lights' volumes.
     background: dome lights are seen behind the geometry, and cover there.
     motion_blur: several samples see as many moments of the camera's shutter.
     light_tolerance: scene-linear value that all dropped light together may reach in one pixel.
@@ -132,6 +141,11 @@ class RenderSettings:
     light_tolerance: float = 1e-5
     shadows: bool = True
     complexity: Complexity = "auto"
+    fit: bool = False
+    turntable: int | None = None
+    direction: tuple[float, float] | None = None
+    studio: bool = False
+    debug: Debug | None = None
     background: bool = True
     motion_blur: bool = True
 
@@ -160,9 +174,12 @@ class OutputSettings:
     variables: what the stage's product has in a file, and under which names; empty has the layers as they are.
     display, view, look: of the OCIO config, for display-referred formats; None takes the config's default, and no look.
     full_float: 32-bit channels in EXR in place of half (data layers are always 32-bit).
+    sheet: pictures hold all layers, as labelled tiles.
     multipart: a part of the EXR for each layer.  tiled: EXR in tiles; mipmaps: in tiles with all smaller levels.
     bits: a channel of a picture; None takes the format's default.  dither: 8-bit colours, against banding.
     verify: read each file back and compare, before it takes its name.
+    on_nan: what becomes of a frame in which values are no numbers: an error once it is written, a warning, or the
+        values of the nearest sound pixels.
     """
 
     patterns: tuple[str, ...] = ()
@@ -175,19 +192,22 @@ class OutputSettings:
     full_float: bool = False
     compression: Compression = "zip"
     split_layers: bool = False
+    sheet: bool = False
     multipart: bool = False
     tiled: bool = False
     mipmaps: bool = False
     bits: Bits | None = None
     dither: bool = False
     verify: bool = False
+    on_nan: OnNan = "error"
 
 
 @dataclass(frozen=True, slots=True)
 class RenderJob:
     """One stage rendered over frames.
 
-    frames: USD time codes, None standing for the default time; empty means the stage's first frame.
+    frames: USD time codes, None standing for the default time; empty means the stage's first frame, or the frames of
+        the turntable, which are 1 and on.
     camera: prim path or name; None picks by the rule in usd/camera.py.
     render_settings: path of a RenderSettings or RenderPass prim; None finds one as usd/products.py does.
     product: path or name of a product of theirs; None makes all that the output's names can hold.
@@ -205,3 +225,7 @@ class RenderJob:
     output: OutputSettings = field(default_factory=OutputSettings)
     device: int | None = None
     given: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        if self.settings.turntable and not self.frames:
+            object.__setattr__(self, "frames", tuple(float(frame + 1) for frame in range(self.settings.turntable)))

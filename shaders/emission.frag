@@ -11,5 +11,8 @@ void main() {
     radiance = vec4(0.0, 0.0, 0.0, covered ? 1.0 : 0.0);
 #ifdef PLANE_EMISSION
     if (covered) radiance.rgb = view.exposure * read_planes(pixel).emission;
+#ifdef PLANE_WEIGHTS
+    if (covered) radiance.rgb *= read_planes(pixel).weights.y;
+#endif
 #endif
 }

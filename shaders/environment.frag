@@ -43,6 +43,10 @@ vec3 reflected_sky(Surface s, vec3 v, out vec3 diffuse) {
     diffuse *= 1.0 - coat;
     specular = specular * (1.0 - coat) + coat * mirrored_sky(s.normal, v, s.clearcoat_roughness);
 #endif
+#ifdef PLANE_WEIGHTS
+    diffuse *= s.weights.x;
+    specular *= s.weights.y;
+#endif
     return diffuse + specular;
 }
 

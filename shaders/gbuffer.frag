@@ -3,7 +3,6 @@
 #include "lib/cutout.glsl"
 #include "lib/detail.glsl"
 #include "lib/material.glsl"
-#include "lib/render_space.glsl"
 #ifdef TEXTURES
 #include "lib/texture.glsl"
 #endif
@@ -38,27 +37,6 @@ in vec4 clip_after;
 flat in uint visible_row;
 #endif
 
-Surface surface_of(Material material, vec3 normal) {
-    Surface s;
-    s.normal = normal;
-#ifdef PLANE_LINKS
-    s.link_set = link_set;
-#endif
-    s.base = render_from_rec709(material.diffuse_color);
-    s.metallic = material.metallic;
-    s.roughness = material.roughness;
-    s.emission = render_from_rec709(material.emissive_color);
-    s.clearcoat = material.clearcoat;
-    s.clearcoat_roughness = material.clearcoat_roughness;
-    set_metallic_fresnel(s, F0_from_ior(material.ior));
-    if (material.use_specular_workflow != 0u) {
-        s.metallic = 0.0;
-        s.f0 = render_from_rec709(material.specular_color);
-        s.f90 = vec3(1.0);
-    }
-    return s;
-}
-
 // Before any branch, because of the derivatives.
 Detail detail_of(vec3 normal) {
     Detail d;
@@ -84,6 +62,14 @@ Detail detail_of(vec3 normal) {
     return d;
 }
 
+float cosine_to_eye(vec3 normal) {
+#ifdef TRANSPARENT
+    return max(dot(normal, direction_to_eye(position_relative)), MIN_NOV);
+#else
+    return 1.0;
+#endif
+}
+
 void main() {
     Material material = material_at(material_index, display_color);
     float side = gl_FrontFacing ? handedness : -handedness;
@@ -92,9 +78,25 @@ void main() {
 #ifdef TEXTURES
     apply_textures(material, normal, position_relative, uv);
 #endif
+#ifdef PLANE_WEIGHTS
+    float turn = turn_of(dFdx(normal), dFdy(normal));
+#endif
+    Surface surface = surface_of(material, side * normal);
+#ifdef PLANE_LINKS
+    surface.link_set = link_set;
+#endif
+#ifdef PLANE_WEIGHTS
+    surface.weights = vec2(1.0);
+    surface.turn = turn;
+#endif
 #ifdef CUTOUT
-    if (is_cut_out(material, instance_index) || (material.one_sided != 0u && side < 0.0)) discard;
+    float coverage = coverage_of(material, surface, cosine_to_eye(surface.normal));
+    bool is_hidden = material.one_sided != 0u && side < 0.0;
+    if (is_hidden || is_cut_out(coverage, instance_index, material_index)) discard;
+#ifdef PLANE_WEIGHTS
+    if (material.is_transparent != 0u) surface.weights = vec2(material.opacity, 1.0) / coverage;
+#endif
 #endif
     detail.occlusion = material.occlusion;
-    write_planes(surface_of(material, side * normal), detail);
+    write_planes(surface, detail);
 }

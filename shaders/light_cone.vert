@@ -4,7 +4,7 @@
 // A polyhedron that holds the cone of light out to its reach. corner.xy is a point of the unit disc: its direction is
 // the azimuth, its length the fraction of the cone's angle; corner.z the fraction of the reach (0: the apex).
 in vec3 corner;
-flat out uint light_index;
+flat out Light light;
 
 uniform uint first_light;
 
@@ -26,7 +26,6 @@ vec3 cone_corner(Light light) {
 }
 
 void main() {
-    light_index = first_light + uint(gl_InstanceID);
-    Light light = lights[light_index];
+    light = lights[first_light + uint(gl_InstanceID)];
     gl_Position = view.clip_from_relative * vec4(light.position + cone_corner(light) * light.reach, 1.0);
 }

@@ -9,10 +9,22 @@
 #include "generated/planes.glsl"
 #include "generated/outputs.glsl"
 
+#ifdef PATCHES
 // A lobe that is wider by the patch of light that one point stands for.
 float widened_roughness(float roughness, float alpha_squared) {
     float alpha = GGX_alpha(roughness);
     return sqrt(min(sqrt(alpha * alpha + alpha_squared), 1.0));
+}
+
+float turn_at(Surface s, ivec2 pixel) {
+#ifdef PLANE_WEIGHTS
+    return s.turn;             // the neighbours may show what lies behind
+#else
+    ivec2 inward = ivec2(lessThan(vec2(pixel) * 2.0, view.size)) * 2 - 1;
+    vec3 across = read_planes(pixel + ivec2(inward.x, 0)).normal - s.normal;
+    vec3 along = read_planes(pixel + ivec2(0, inward.y)).normal - s.normal;
+    return turn_of(across, along);
+#endif
 }
 
 // How much alpha² grows where a sample stands for its share of a pixel in which the normal turns: Tokuyoshi & Kaplanyan
@@ -24,22 +36,25 @@ float pixel_alpha_squared(Surface s, ivec2 pixel) {
     if (s.clearcoat > 0.0) sharpest = min(sharpest, s.clearcoat_roughness);
 #endif
     if (view.pixel_share == 0.0 || sharpest > 0.35) return 0.0;
-    ivec2 inward = ivec2(lessThan(vec2(pixel) * 2.0, view.size)) * 2 - 1;
-    vec3 across = read_planes(pixel + ivec2(inward.x, 0)).normal - s.normal;
-    vec3 along = read_planes(pixel + ivec2(0, inward.y)).normal - s.normal;
-    return view.pixel_share * min((dot(across, across) + dot(along, along)) / PI, 0.18);
+    return view.pixel_share * min(turn_at(s, pixel) / PI, 0.18);
 }
+#endif
 
-flat in uint light_index;
+flat in Light light;
 
 // What of each lobe a light may show: the environment pass shows a dome in the sharp ones.
 vec3 lobe_response(Light light, Surface s) {
     vec3 response = light.response.xyy;
+#ifdef PLANE_WEIGHTS
+    response *= s.weights.xyy;
+#endif
+#ifdef SKY
     if (light.is_sky == 0u) return response;
 #ifdef PLANE_CLEARCOAT
     response.z *= 1.0 - sharpness(s.clearcoat_roughness);
 #endif
     response.y *= 1.0 - sharpness(s.roughness);
+#endif
     return response;
 }
 
@@ -49,14 +64,14 @@ void main() {
     if (stored == BACKGROUND_DEPTH) discard;
     vec3 position = position_at(gl_FragCoord.xy, camera_depth(stored));
     vec3 l;
-    vec3 irradiance = irradiance_from(lights[light_index], position, l);
+    vec3 irradiance = irradiance_from(light, position, l);
     if (irradiance == vec3(0.0)) {
         write_nothing();
         return;
     }
     Surface surface = read_planes(pixel);
 #ifdef PLANE_LINKS
-    if (!is_linked(lights[light_index].first_link, surface.link_set)) {
+    if (!is_linked(light.first_link, surface.link_set)) {
         write_nothing();
         return;
     }
@@ -64,18 +79,20 @@ void main() {
     Lit lit;
     lit.sent = dot(irradiance, vec3(1.0)) * max(dot(surface.normal, l), 0.0);
     lit.volumes = 1.0;
-    lit.visible = visibility(lights[light_index], position, l);
+    lit.visible = visibility(light, position, l);
 #ifdef SHADOW_STYLES
-    irradiance *= mix(lights[light_index].shadow_color, vec3(1.0), lit.visible);
+    irradiance *= mix(light.shadow_color, vec3(1.0), lit.visible);
 #else
     irradiance *= lit.visible;
 #endif
-    float widening = patch_alpha_squared(lights[light_index], position, l) + pixel_alpha_squared(surface, pixel);
+#ifdef PATCHES
+    float widening = patch_alpha_squared(light, position, l) + pixel_alpha_squared(surface, pixel);
     if (widening > 0.0) {
         surface.roughness = widened_roughness(surface.roughness, widening);
         surface.clearcoat_roughness = widened_roughness(surface.clearcoat_roughness, widening);
     }
-    vec3 v = direction_to_eye(position), response = lobe_response(lights[light_index], surface);
+#endif
+    vec3 v = direction_to_eye(position), response = lobe_response(light, surface);
     vec3 arriving = view.exposure * render_from_rec709(irradiance);
     lit.radiance = arriving * evaluate_brdf(surface, v, l, response);
 #ifdef SPLIT

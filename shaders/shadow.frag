@@ -7,16 +7,38 @@
 
 in vec4 uv;
 #endif
-in float display_opacity;
+#ifdef TRANSPARENT
+in vec3 position_relative;
+in vec3 normal_relative;
+
+uniform vec4 towards_light;    // its position, or with w = 0 its direction
+#endif
+in vec4 display_color;
 flat in uint material_index;
 flat in uint instance_index;
 
-void main() {
-    Material material = material_at(material_index, vec4(vec3(0.0), display_opacity));
+#ifdef TRANSPARENT
+// As the light sees it, whichever side is turned to it.
+float cast_coverage(Material material) {
+    vec3 normal = normalize(normal_relative);
+#ifdef TEXTURES
+    apply_textures(material, normal, position_relative, uv);
+#endif
+    vec3 l = normalize(towards_light.xyz - towards_light.w * position_relative);
+    return coverage_of(material, surface_of(material, normal), max(abs(dot(normal, l)), MIN_NOV));
+}
+#else
+float cast_coverage(Material material) {
 #ifdef TEXTURES
     apply_opacity_texture(material, uv);
 #endif
-    if (is_cut_out(material, instance_index)) discard;
+    return coverage_of(material, surface_of(material, vec3(0.0)), 1.0);
+}
+#endif
+
+void main() {
+    Material material = material_at(material_index, display_color);
+    if (is_cut_out(cast_coverage(material), instance_index, material_index)) discard;
 }
 #else
 void main() {}

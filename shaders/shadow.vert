@@ -19,9 +19,14 @@ in vec4 vertex_color;
 in vec4 vertex_uv;
 out vec4 uv;
 #endif
-out float display_opacity;
+out vec4 display_color;
 flat out uint material_index;
 flat out uint instance_index;
+#ifdef TRANSPARENT
+in vec3 normal_object;
+out vec3 position_relative;
+out vec3 normal_relative;
+#endif
 #endif
 
 void main() {
@@ -37,9 +42,14 @@ void main() {
 #ifdef TEXTURES
     uv = vertex_uv;
 #endif
-    display_opacity = instance.display_opacity;
+    display_color = vec4(instance.display_color, instance.display_opacity);
 #ifdef DISPLAY_COLOR_VARIES
-    if (vertex_color.a >= 0.0) display_opacity = vertex_color.a;
+    if (vertex_color.r >= 0.0) display_color.rgb = vertex_color.rgb;
+    if (vertex_color.a >= 0.0) display_color.a = vertex_color.a;
+#endif
+#ifdef TRANSPARENT
+    position_relative = position.xyz;
+    normal_relative = mat3(instance.relative_from_normal) * normal_object;
 #endif
 #endif
 }

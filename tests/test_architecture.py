@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
@@ -155,6 +157,14 @@ def test_no_import_circle() -> None:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
         pytest.fail(f"an import circle: {' → '.join(reversed(error.args[1]))}")
+
+
+def test_a_render_imports_no_slow_library_before_it_needs_it() -> None:
+    """Each costs more than the frame of a small stage."""
+    slow = {"scipy", "rich", "colour", "yaml", "distributed", "PyOpenColorIO", "MaterialX"}
+    code = "import sys, defshade_cli.cli, defshade_cli.rendering; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert not slow & set(done.stdout.split())
 
 
 @pytest.mark.parametrize("folder", ["defshade_cli", "tests"])

@@ -101,7 +101,7 @@ def _random_surface(count: int, seed: int, *, roughness: tuple[float, float] = (
         position=np.zeros((count, 3)), normal=normal, view=_around(rng, normal), base=base, metallic=metallic,
         roughness=rng.uniform(*roughness, count), f0=edge * (0.04 + 0.96 * metallic[:, None]), f90=edge,
         clearcoat=rng.uniform(0, 1, count), clearcoat_roughness=rng.uniform(*roughness, count),
-        emission=np.zeros((count, 3)),
+        emission=np.zeros((count, 3)), weights=np.ones((count, 2)),
     )  # fmt: skip
 
 

@@ -120,6 +120,35 @@ def test_a_tinted_image_is_scale_and_bias(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("name", "space"),
+    [
+        ("acescg", "lin_ap1_scene"),
+        ("adobergb", "g22_adobergb_scene"),
+        ("lin_rec2020_scene", "lin_rec2020_scene"),
+        ("gamma18", "g18_rec709_scene"),
+        ("srgb_rec709_scene", "sRGB"),
+        ("lin_rec709", "raw"),
+        ("none", "raw"),
+    ],
+)
+def test_images_keep_their_colour_space(tmp_path: Path, name: str, space: str) -> None:
+    wood = WOOD.replace("srgb_texture", name)
+    found, lost = read(tmp_path, STANDARD, COLOR.format("wood"), wood)
+    assert (found.inputs["diffuse_color"].texture.color_space, lost) == (space, [])
+
+
+def test_constants_are_converted_and_unknown_spaces_named(tmp_path: Path) -> None:
+    """ACEScg's red by the matrix of the ACES project, (1.705, −0.130, −0.024); colours are no less than 0."""
+    red = 'color3f inputs:emission_color = (1, 0, 0) (colorSpace = "{}")\nfloat inputs:emission = 1'
+    found, lost = read(tmp_path, STANDARD, red.format("acescg"))
+    np.testing.assert_allclose(np.maximum(found.emissive_color, 0.0), (1.7050504, 0, 0), atol=1e-4)
+    assert lost == []
+    found, lost = read(tmp_path, STANDARD, red.format("lin_nowhere"))
+    np.testing.assert_allclose(found.emissive_color, (1, 0, 0))
+    assert any("colour space lin_nowhere" in reason for reason in lost)
+
+
+@pytest.mark.parametrize(
     ("identifier", "inputs", "channel", "scale", "bias"),
     [
         ("ND_extract_color3", "color3f inputs:in.connect = {}\nint inputs:index = 1", "g", 1, 0),

@@ -27,6 +27,10 @@ TAIL_BOUND = {"float": 1e-3, "packed": 0.106, "rgba8": 0.60}
 """Of the 99.9th percentile: what the error of a normal, octahedral 12+12 or unorm8, does to D at roughness 0.1."""
 
 
+BEYOND_BYTES = {"colorchecker"}
+"""Stages with albedos below 0.05, and outside Rec.709, where bytes cannot follow: held to the float layout alone."""
+
+
 @pytest.fixture(scope="module")
 def pipeline(gpu: Gpu) -> Iterator[Pipeline]:
     yield Pipeline(gpu)
@@ -43,7 +47,7 @@ def test_beauty_agrees_with_the_reference(pipeline: Pipeline, stage: str, shadin
     errors = layout_errors(
         pipeline, scene_of(stage), RenderSettings(size=SIZE, shading=shading, shadows=False, light_points=1)
     )
-    for layout in LAYOUTS:
+    for layout in LAYOUTS if stage not in BEYOND_BYTES else ("float",):
         assert errors[layout].lit > 1000
         assert errors[layout].median <= MEDIAN_BOUND[layout]
         assert errors[layout].p999 <= TAIL_BOUND[layout]

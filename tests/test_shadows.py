@@ -97,7 +97,7 @@ def test_a_light_that_casts_no_shadow_casts_none(pipeline: Pipeline) -> None:
 
 def test_half_opacity_casts_half_a_shadow(pipeline: Pipeline) -> None:
     """A coin a texel and sample, 64 of them under every pixel: 6 % of noise a pixel, far less over the image."""
-    thin = Material("/thin", opacity=0.5)
+    thin = Material("/thin", opacity=0.5, opacity_mode="presence")
     meshes = [quad(5.0), quad(1.5, 1.0)]
     placed = [drawable(meshes[0], 0), drawable(meshes[1], 1, 1)]
     of = scene(meshes, [replace(bulb(0, 0, 3), treat_as_point=True)], [WHITE, thin], camera(0.9), placed)

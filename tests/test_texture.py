@@ -205,6 +205,24 @@ def test_udim_tiles_and_holes(pipeline: Pipeline, tmp_path: Path) -> None:
     np.testing.assert_allclose(found[2::4, 2::4, 0], [[0.0, 0.8], [0.2, 0.4]], atol=1e-3)
 
 
+@pytest.mark.parametrize("size", [4, 10, 24, 64, 130, 500])
+def test_udim_tiles_meet_without_a_seam(pipeline: Pipeline, tmp_path: Path, size: int) -> None:
+    """A ramp over two tiles of 64 texels, whose far borders are as different as can be, smaller and larger than seen.
+
+    Reading keeps half a texel from a tile's border, of the mip level below a pixel's size at the coarsest: the ramp
+    stands still there for at most a pixel, or for half a texel where that is more. Blending around the tile would
+    be off by 0.25 in the texel at the border.
+    """
+    ramp = np.round(np.broadcast_to((np.arange(128)[:, None] + 0.5) / 128 * 65535, (64, 128, 3))).astype(np.uint16)
+    files = [(1001 + i, save(tmp_path / f"{i}.png", ramp[:, 64 * i : 64 * i + 64])) for i in (0, 1)]
+    texture = Texture(tuple(files), udim=True, color_space="raw")
+    uv = np.array([[0, 0], [2, 0], [2, 1], [0, 1]])
+    found = layer(pipeline, textured({"diffuse_color": TextureInput(texture)}, uv), "albedo", size)[size // 2, :, 0]
+    expected = (np.arange(size) + 0.5) / size
+    assert np.abs(found - expected).max() <= max(1.0 / size, 0.5 / 128) + 1e-3
+    assert (np.diff(found) >= -1e-3).all()
+
+
 def test_minified_textures_are_averaged(pipeline: Pipeline, tmp_path: Path) -> None:
     checker = (np.indices((64, 64)).sum(0) % 2 * 255).astype(np.uint8)[..., None].repeat(3, 2)
     texture = plain(save(tmp_path / "a.png", checker), color_space="raw", wrap_s="clamp", wrap_t="clamp")

@@ -1,7 +1,7 @@
 """The command line: the only package that speaks click and rich.
 
     options    what commands share, and the RenderJob it becomes
-    render gbuffer batch inspect compare doctor    one command each
+    render gbuffer batch inspect bench compare doctor    one command each
     progress   the ways of telling how far a job is    stats    the record that --stats writes
     jobfile tally table    what batch reads, counts and shows
     reference  docs/commands.md, from the commands themselves
@@ -18,6 +18,7 @@ import click
 
 from defshade_cli import __version__
 from defshade_cli.cli.batch import batch
+from defshade_cli.cli.bench import bench
 from defshade_cli.cli.compare import compare
 from defshade_cli.cli.doctor import doctor
 from defshade_cli.cli.gbuffer import gbuffer
@@ -46,7 +47,7 @@ def defshade(context: click.Context) -> None:
         context.exit(UsageError.exit_code)
 
 
-for command in (render, gbuffer, batch, inspect, compare, doctor):
+for command in (render, gbuffer, batch, inspect, bench, compare, doctor):
     defshade.add_command(command)
 
 

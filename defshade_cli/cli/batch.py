@@ -64,6 +64,7 @@ class Schedule:
     engine: str
     scheduler: str | None
     resources: tuple[tuple[str, float], ...]
+    report: Path | None
 
 
 def _takes_jobs(function: Function) -> Function:
@@ -114,6 +115,12 @@ def _batch_options() -> list[Function]:
             default=1,
             default_text="1",
             help="How often a frame that failed is rendered again.",
+        ),
+        option(
+            "--report",
+            type=click.Path(dir_okay=False, path_type=Path),
+            metavar="FILE.html",
+            help="Write a page of all frames with thumbnails, times and logs, and its record as JSON beside it.",
         ),
         option(
             "--keep-going/--fail-fast",
@@ -186,7 +193,8 @@ def _render(
     from defshade_cli.farm.batch import run_batch
     from defshade_cli.farm.tasks import frame_count, leaving_no_leftovers
 
-    with make_progress(reporting, frame_count(jobs), BatchTable) as progress, Tally(jobs, reporting) as tally:
+    tally = Tally(jobs, reporting, schedule.report)
+    with make_progress(reporting, frame_count(jobs), BatchTable) as progress, tally:
         with leaving_no_leftovers(jobs), _make_engine(workers, reporting, schedule) as engine:
             for outcome in run_batch(chunks, engine, retries=schedule.retries, keep_going=schedule.keep_going):
                 tally.add(outcome)

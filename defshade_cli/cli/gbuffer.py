@@ -13,6 +13,7 @@ _EPILOG = epilog(
     "defshade gbuffer scene.usda",
     "defshade gbuffer scene.usda --layers depth,normal --width 640 -o training.exr",
     "defshade gbuffer shot.usd --frames 1:100 --split-layers -o 'data/{scene}.####.exr'",
+    "defshade gbuffer scene.usda --sheet --layers albedo,metallic,normal,roughness,depth,beauty",
     layers=True,
 )
 

@@ -41,7 +41,8 @@ _EPILOG = epilog(
     "saved",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE.usda",
-    help="Write the RenderSettings that the options amount to, for --session-layer or the stage's own layers.",
+    help="Write the RenderSettings that the options amount to: for --session-layer FILE.usda --settings "
+    "/Render/settings, or for the stage's own layers.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print JSON in place of a tree.")
 def inspect(job: RenderJob, as_json: bool, with_plan: bool, timing: bool, saved: Path | None) -> None:

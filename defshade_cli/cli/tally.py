@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -26,11 +27,14 @@ _NAMED = 5
 class Tally:
     """Gathers outcomes; a context manager that prints the summary and writes the record, also after an interruption.
 
+    report: the page that farm.report writes at the end, None for none.
     The record is written before the batch as well, so that a file that cannot be written costs no render: OutputError.
     """
 
-    def __init__(self, jobs: Sequence[RenderJob], reporting: Reporting) -> None:
+    def __init__(self, jobs: Sequence[RenderJob], reporting: Reporting, report: Path | None = None) -> None:
         self.failures: list[Outcome] = []
+        self._outcomes: list[Outcome] = []
+        self._report = report
         self._counts = {"rendered": 0, "skipped": 0, "failed": 0}
         self._reporting, self._start = reporting, time.perf_counter()
         self._record: dict[str, Any] = {"version": __version__, "jobs": jobs, "frames": []}
@@ -47,6 +51,10 @@ class Tally:
             click.echo(self.summary, err=True)
         self._record["seconds"] = time.perf_counter() - self._start
         self._write()
+        if self._report is not None:
+            from defshade_cli.farm.report import write_report
+
+            write_report(self._outcomes, self._record["seconds"], self._report)
 
     def add(self, outcome: Outcome) -> None:
         """Count the outcome, and show what its log says that no log before it said."""
@@ -54,6 +62,8 @@ class Tally:
         self._counts[what] += 1
         if outcome.error:
             self.failures.append(outcome)
+        if self._report is not None:
+            self._outcomes.append(outcome)
         if self._reporting.stats is not None:
             self._record["frames"].append(_figures(outcome, what))
         if not self._reporting.quiet:

@@ -6,7 +6,7 @@ import difflib
 import math
 import re
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import click
 
@@ -64,6 +64,29 @@ class Finite(click.ParamType):
         return number
 
 
+class Direction(click.ParamType):
+    """`left`, or `30,20` → (azimuth, elevation) in degrees from the front towards +X, and upwards."""
+
+    name = "direction"
+    names: ClassVar[dict[str, tuple[float, float]]] = {
+        "front": (0.0, 0.0),
+        "right": (90.0, 0.0),
+        "back": (180.0, 0.0),
+        "left": (-90.0, 0.0),
+        "top": (0.0, 90.0),
+        "bottom": (0.0, -90.0),
+    }
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+        if value in self.names:
+            return self.names[value]
+        match = re.fullmatch(r"([-+]?\d+(?:\.\d*)?),([-+]?\d+(?:\.\d*)?)", value)
+        if not match or abs(float(match[2])) > 90.0:
+            known = ", ".join(self.names)
+            self.fail(f"{value!r} is none of {known}, nor an azimuth and an elevation such as 30,20", param, ctx)
+        return float(match[1]), float(match[2])
+
+
 class Positive(Finite):
     """A finite float above 0."""
 
@@ -100,6 +123,17 @@ class OneOf(click.ParamType):
         if str(value) not in map(str, self.choices):
             self.fail(f"{value!r} is not {' or '.join(map(str, self.choices))}", param, ctx)
         return int(value)
+
+
+class Counts(click.ParamType):
+    """`1,4,16` → the whole numbers above 0, each once, ascending."""
+
+    name = "1,4,16"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, ...]:
+        if not re.fullmatch(r"\s*[1-9]\d*\s*(,\s*[1-9]\d*\s*)*", value):
+            self.fail(f"{value!r} is not a list of whole numbers above 0 such as 1,4,16", param, ctx)
+        return tuple(sorted({int(number) for number in value.split(",")}))
 
 
 class Names(click.ParamType):

@@ -50,7 +50,8 @@ class Fingerprint:
         composition = replace(self._job.composition, session_layers=tuple(Path(layer.name) for layer in layers))
         stage = Path(self._job.stage.name)
         job = replace(self._job, stage=stage, composition=composition, frames=(), device=None, output=output)
-        return repr((__version__, contents, job))
+        given = sorted(job.given)  # a set has another order in each process
+        return repr((__version__, contents, replace(job, given=frozenset()), given))
 
 
 def _made_of(file: Path) -> tuple[list[tuple[str, str]], tuple[str, ...]]:

@@ -9,8 +9,9 @@ from defshade_cli.farm.own_settings import with_own_settings
 from defshade_cli.farm.shots import Shot, layers_of, make_shot, wanted_products
 from defshade_cli.image.layers.extras import extras_of
 from defshade_cli.image.layers.variables import layer_of
+from defshade_cli.scene.framing import THREE_QUARTER, Framing
 from defshade_cli.scene.product import Product
-from defshade_cli.settings import RenderJob
+from defshade_cli.settings import RenderJob, RenderSettings
 from defshade_cli.usd.products import lost_products, read_products
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.saved_settings import read_own_settings
@@ -77,6 +78,15 @@ class OpenJob:
             complexity=settings.complexity,
             size=settings.size,
             width=settings.width,
+            framing=_framing(settings),
+            studio=settings.studio,
             extras=extras_of(layers),
             beside=next(iter(self._readers.values()), None),
         )
+
+
+def _framing(settings: RenderSettings) -> Framing | None:
+    """The camera of ours that is asked for."""
+    if not (settings.fit or settings.turntable):
+        return None
+    return Framing(settings.direction or THREE_QUARTER, settings.turntable)

@@ -28,6 +28,8 @@ OWN = {
     "complexity": str,
     "background": bool,
     "motion_blur": bool,
+    "fit": bool,
+    "studio": bool,
 }
 """The fields of RenderSettings that UsdRender has no place for, and what they hold."""
 

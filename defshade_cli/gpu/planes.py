@@ -138,6 +138,16 @@ PLANES: tuple[Plane, ...] = (
         _encodings("vec4(float(s.link_set))", "s.link_set = uint(t.r);", narrow="f4"),
         lambda _: False,
     ),
+    Plane(
+        "weights",  # whether they are needed is known with displayOpacity
+        3,
+        _encodings(
+            "vec4(s.weights, s.turn, 0.0)",
+            "s.weights = t.xy; s.turn = t.z;",
+            narrow="f4",  # the lobes of a surface that is hardly there weigh millions
+        ),
+        lambda _: False,
+    ),
     _detail("facet", 4, "vec4(d.facet, 0.0)", "POSITION"),
     _detail("tangent", 4, "vec4(d.tangent, 0.0)", "POSITION", "LAYER_UV"),
     _detail("uv", 2, "vec4(d.uv, 0.0, 0.0)", "LAYER_UV"),

@@ -2,7 +2,7 @@
 
     .exr     scene-linear, one scanline file with all layers; light and reflectance in half, data always in 32 bits
     others   a picture to look at (image.colour.picture), one file a layer: the beauty has the path itself,
-             another layer puts its name before the suffix
+             another layer puts its name before the suffix; as a sheet all are tiles of one
 
 A file appears whole or not at all: it is written beside its target under a hidden name, then renamed.
 """
@@ -32,7 +32,7 @@ def targets(layers: Iterable[str], output: OutputSettings, path: Path) -> dict[P
     if output.variables:
         names = tuple(v.name for v in output.variables)
         main = next((v.name for v in output.variables if v.layer == BEAUTY), names[0])
-    if not output.split_layers and (suffix_of(path) == EXR or len(names) == 1):
+    if not output.split_layers and (output.sheet or suffix_of(path) == EXR or len(names) == 1):
         return {path: names}
     labels = {name: name if output.variables else LAYERS[name].exr_name for name in names}
     beside = {name: path.with_name(f"{path.stem}.{label}{path.suffix}") for name, label in labels.items()}
@@ -62,7 +62,7 @@ def write(film: Film, output: OutputSettings, path: Path) -> tuple[Path, ...]:
     for file, names in files.items():
         with _appearing_at(file) as hidden:
             encode(film, names, output, hidden)
-            if output.verify:
+            if output.verify and not (output.sheet and suffix_of(path) != EXR):
                 verify(hidden, film, names, output)
     return tuple(files)
 

@@ -16,6 +16,8 @@ from defshade_cli.settings import Shading
 from defshade_cli.spaces import normalize
 
 Array = NDArray[np.float64]
+Response = tuple[Array, Array]
+"""(P, 1) each: multiplies the diffuse and the specular part."""
 
 MIN_ALPHA = 1e-4
 """Least GGX alpha: roughness 0 is a delta that no point light can hit, so it means roughness 0.01."""
@@ -48,6 +50,7 @@ class Surface:
     position, normal, view: (P, 3) world space; normal unit and facing the camera, view unit towards the eye.
     base, f0, f90, emission: (P, 3) scene-linear; f0 and f90 are preview-surface's, classic derives its own.
     metallic, roughness, clearcoat, clearcoat_roughness: (P,) 0..1.
+    weights: (P, 2) of the diffuse, and of lobes and emission: what a sample of a transparent surface stands for.
     """
 
     position: Array
@@ -61,6 +64,7 @@ class Surface:
     clearcoat: Array
     clearcoat_roughness: Array
     emission: Array
+    weights: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,12 +144,24 @@ def evaluate_brdf(
     angles = Angles.between(surface.normal, surface.view, light_direction)
     model = preview_surface if shading == "preview-surface" else classic
     lit = angles.nol > 0.0
+    weighed = response[0] * surface.weights[:, :1], response[1] * surface.weights[:, 1:]
     with np.errstate(divide="ignore", invalid="ignore"):
-        reflected = model(surface, angles, response) * angles.nol[..., None]
+        reflected = model(surface, angles, weighed) * angles.nol[..., None]
     return np.where(lit[..., None], reflected, 0.0)
 
 
-def preview_surface(surface: Surface, angles: Angles, response: tuple[float, float]) -> Array:
+def coverage(surface: Surface, opacity: Array | float, cosine: Array) -> Array:
+    """(P,) how much of what lies behind a transparent surface it hides, along a direction off its normal.
+
+    All that its lobes leave passes, but for the diffuse's share, the opacity.
+    """
+    fit, coat_alpha = SMITH_GGX, alpha_from_roughness(surface.clearcoat_roughness)
+    lobe = E_bound(surface.f0, surface.f90, cosine, alpha_from_roughness(surface.roughness), fit).max(axis=-1)
+    coat = surface.clearcoat * E_bound(COAT_F0, 1.0, cosine, coat_alpha, fit)[..., 0]
+    return 1.0 - (1.0 - opacity) * np.clip(1.0 - lobe, 0.0, 1.0) * (1.0 - coat)
+
+
+def preview_surface(surface: Surface, angles: Angles, response: Response) -> Array:
     """UsdPreviewSurface: Lambert under a GGX lobe, both under an optional white coat."""
     fresnel = F_Schlick(surface.f0, surface.f90, angles.voh)
     specular = _microfacets(surface.roughness, angles)[..., None] * fresnel
@@ -161,7 +177,7 @@ def preview_surface(surface: Surface, angles: Angles, response: tuple[float, flo
     return (diffuse * response[0] + specular * response[1]) * below + coat * response[1]
 
 
-def classic(surface: Surface, angles: Angles, response: tuple[float, float]) -> Array:
+def classic(surface: Surface, angles: Angles, response: Response) -> Array:
     """The model this project started from, with its defects mended: see docs/lighting.md."""
     metallic = surface.metallic[..., None]
     real_albedo = surface.base - surface.base * metallic

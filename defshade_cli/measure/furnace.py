@@ -65,7 +65,7 @@ def _point(base: float, metallic: float, roughness: float, f0: float, f90: float
     return Surface(
         position=np.zeros((1, 3)), normal=up, view=up, base=grey(base), metallic=np.full(1, metallic),
         roughness=np.full(1, roughness), f0=grey(f0), f90=grey(f90), clearcoat=zero,
-        clearcoat_roughness=zero, emission=np.zeros((1, 3)),
+        clearcoat_roughness=zero, emission=np.zeros((1, 3)), weights=np.ones((1, 2)),
     )  # fmt: skip
 
 

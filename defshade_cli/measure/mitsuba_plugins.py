@@ -49,19 +49,34 @@ class PreviewSurface(mi.BSDF):
         self._base, self._f0, self._f90 = (mi.Color3f(props[name]) for name in ("base", "f0", "f90"))
         self._metallic, self._clearcoat = props["metallic"], props["clearcoat"]
         self._alpha, self._coat_alpha = _alpha(props["roughness"]), _alpha(props["clearcoat_roughness"])
-        self.m_components = [mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide]
-        self.m_flags = self.m_components[0]
+        self._opacity, self._is_transparent = props["opacity"], props["is_transparent"]
+        both_sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
+        self.m_components = [mi.BSDFFlags.GlossyReflection | both_sides, mi.BSDFFlags.Null | both_sides]
+        self.m_flags = self.m_components[0] | self.m_components[1]
+
+    def _passed(self, cosine: Any) -> Any:
+        """What goes straight through: all that the lobes leave, but for the opacity's share."""
+        if self._opacity >= 1.0 or not self._is_transparent:
+            return 1.0 - self._opacity
+        nov = dr.maximum(dr.abs(cosine), MIN_NOV)
+        lobe = dr.max(_taken(self._f0, self._f90, nov, self._alpha))
+        coat = self._clearcoat * _taken(COAT_F0, 1.0, nov, self._coat_alpha)
+        return (1.0 - self._opacity) * dr.clip(1 - lobe, 0, 1) * (1 - coat)
+
+    def eval_null_transmission(self, si: Any, active: Any = True) -> Any:
+        return mi.Color3f(dr.select(active, self._passed(si.wi.z), 0.0))
 
     def _reflectance(self, nov: Any, nol: Any, voh: Any, h: Any) -> Any:
         """f(l, v): the one place that holds the model."""
         fresnel = _schlick(self._f0, self._f90, voh)
         grazing = dr.minimum(nov, nol)
         taken = dr.maximum(fresnel, _taken(self._f0, self._f90, grazing, self._alpha))
-        diffuse = self._base * ((1 - self._metallic) * dr.inv_pi) * (1 - taken)
+        diffuse = self._base * (self._opacity * (1 - self._metallic) * dr.inv_pi) * (1 - taken)
         coat = _schlick(COAT_F0, 1.0, voh)
         coat_taken = dr.maximum(coat, _taken(COAT_F0, 1.0, grazing, self._coat_alpha))
-        below = diffuse + _lobe(self._alpha, nov, nol, h) * fresnel
-        above = _lobe(self._coat_alpha, nov, nol, h) * (coat * self._clearcoat)
+        kept = 1.0 if self._is_transparent else self._opacity
+        below = diffuse + _lobe(self._alpha, nov, nol, h) * fresnel * kept
+        above = _lobe(self._coat_alpha, nov, nol, h) * (coat * self._clearcoat * kept)
         return below * (1 - self._clearcoat * coat_taken) + above
 
     def _facing(self, si: Any, wo: Any) -> tuple[Any, Any]:
@@ -85,19 +100,24 @@ class PreviewSurface(mi.BSDF):
         h = dr.normalize(wi + wo)
         microfacets = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, self._alpha, False)
         specular = microfacets.pdf(wi, h) / (4 * dr.maximum(dr.dot(wi, h), 1e-6))
-        return 0.5 * mi.warp.square_to_cosine_hemisphere_pdf(wo) + 0.5 * specular
+        return (1 - self._passed(wi.z)) * 0.5 * (mi.warp.square_to_cosine_hemisphere_pdf(wo) + specular)
 
     def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> tuple[Any, Any]:
         wi, _ = self._facing(si, si.wi)
+        passed = self._passed(wi.z)
+        passes = sample1 < passed
+        sample1 = (sample1 - passed) / dr.maximum(1 - passed, 1e-6)
         microfacets = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, self._alpha, False)
         half, _ = microfacets.sample(wi, sample2)
         wo = dr.select(sample1 < 0.5, mi.warp.square_to_cosine_hemisphere(sample2), mi.reflect(wi, half))
         bs = dr.zeros(mi.BSDFSample3f)
         bs.wo = self._facing(si, wo)[1]
         bs.pdf, bs.eta = dr.select(wo.z > 0, self._density(wi, wo), 0.0), 1.0
-        bs.sampled_type, bs.sampled_component = mi.UInt32(+self.m_flags), mi.UInt32(0)
-        active &= bs.pdf > 0
-        return bs, dr.select(active, self.eval(ctx, si, bs.wo, active) / bs.pdf, 0.0)
+        bs.sampled_type, bs.sampled_component = mi.UInt32(+self.m_components[0]), mi.UInt32(0)
+        weight = dr.select(bs.pdf > 0, self.eval(ctx, si, bs.wo, active) / bs.pdf, 0.0)
+        bs.wo, bs.pdf = dr.select(passes, -si.wi, bs.wo), dr.select(passes, passed, bs.pdf)
+        bs.sampled_type[passes], bs.sampled_component[passes] = +mi.BSDFFlags.Null, mi.UInt32(1)
+        return bs, dr.select(active & (bs.pdf > 0), dr.select(passes, 1.0, weight), 0.0)
 
     def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
         return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)

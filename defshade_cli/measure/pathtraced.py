@@ -45,7 +45,7 @@ class Reference:
 
 def path_traced(scene: Scene, plan: Plan, samples: int) -> Reference:
     """Render with `samples` a pixel. Raises DefshadeError for what the conversion does not know."""
-    world = mi.load_dict(_world(scene, plan))
+    world = mi.load_dict(mitsuba_world(scene, plan, {"type": "volpath", "max_depth": 2, "hide_emitters": True}))
     chunks = max(1, math.ceil(samples / 2 / _CHUNK))
     halves = [_mean(world, range(half * chunks, (half + 1) * chunks)) for half in (0, 1)]
     return Reference(np.stack(halves) * np.float32(plan.exposure))
@@ -58,8 +58,8 @@ def _mean(world: Any, seeds: range) -> NDArray[np.float32]:
     return (total / len(seeds)).astype(np.float32)
 
 
-def _world(scene: Scene, plan: Plan) -> dict[str, Any]:
-    integrator = {"type": "volpath", "max_depth": 2, "hide_emitters": True}
+def mitsuba_world(scene: Scene, plan: Plan, integrator: dict[str, Any]) -> dict[str, Any]:
+    """What Mitsuba's load_dict takes. Raises DefshadeError for what the conversion does not know."""
     world: dict[str, Any] = {"type": "scene", "integrator": integrator, "sensor": _sensor(plan)}
     for number, (material, part) in enumerate(_parts(scene)):
         world[f"part{number}"] = _mesh(f"part{number}", part, material)
@@ -127,8 +127,8 @@ def _placed(mesh: Mesh, world_from_object: Matrix) -> _Part:
 
 
 def _shown(material: Material, drawable: Drawable, row: int) -> Material:
-    if material.opacity < 1.0:
-        raise DefshadeError(f"{material.path}: path tracing takes opaque materials only")
+    if material.opacity_threshold > 0.0 or (material.uses_display_opacity and drawable.display_opacity[row] < 1.0):
+        raise DefshadeError(f"{material.path}: path tracing takes constant opacity without a threshold only")
     if not material.uses_display_color:
         return material
     return replace(material, diffuse_color=tuple(drawable.display_color[row].tolist()))
@@ -154,13 +154,14 @@ def _bsdf(material: Material) -> dict[str, Any]:
         f90 = 1.0 + (base - 1.0) * metallic
         dielectric = ((1.0 - material.ior) / (1.0 + material.ior)) ** 2 * f90
         f0 = dielectric + (f90 - dielectric) * metallic
-    scalars = ("roughness", "clearcoat", "clearcoat_roughness")
+    scalars = ("roughness", "clearcoat", "clearcoat_roughness", "opacity")
     return {
         "type": "preview_surface",
         "base": _vector(base),
         "f0": _vector(f0),
         "f90": _vector(f90),
         "metallic": float(metallic),
+        "is_transparent": material.is_transparent,
     } | {name: float(getattr(material, name)) for name in scalars}
 
 

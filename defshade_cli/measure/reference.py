@@ -50,7 +50,7 @@ def shade(
 
     link_sets: (P,) int, of what stands there; without them everything is linked.
     """
-    radiance = surface.emission.copy()
+    radiance = surface.emission * surface.weights[:, 1:]
     for light in lights:
         direction, irradiance = irradiance_at(light, surface.position)
         reflected = irradiance * evaluate_brdf(surface, direction, (light.diffuse, light.specular), shading=shading)
@@ -65,7 +65,7 @@ def surface_from_planes(planes: Planes, camera: Camera) -> tuple[Surface, NDArra
 
     planes: (H, W, C) float32, row 0 at the top. "base": rgb and metallic; "normal": world xyz and roughness;
         "depth": planar camera z, +inf on the background; "emission", "specular" (F0) and "clearcoat" (amount
-        and roughness) where the stage has them; "links": the link set.
+        and roughness) and "weights" where the stage has them; "links": the link set.
     camera: conformed to the image's aspect.
     """
     depth = planes["depth"][..., 0].astype(np.float64)
@@ -93,6 +93,7 @@ def surface_from_planes(planes: Planes, camera: Camera) -> tuple[Surface, NDArra
         clearcoat=coat[:, 0],
         clearcoat_roughness=coat[:, 1],
         emission=plane("emission", 3)[:, :3],
+        weights=plane("weights", 2)[:, :2] if "weights" in planes else np.ones((len(base), 2)),
     )
     return surface, covered
 

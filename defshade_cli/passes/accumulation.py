@@ -54,6 +54,8 @@ class AccumulationPass:
 
     def mean(self, counts: NDArray[np.int32]) -> NDArray[np.float32]:
         """(height, width, 4); counts: (height, width, 1) samples that each pixel got."""
+        if self._is_single:
+            return self.step.read("radiance")
         step, *total = (target.read("radiance") for target in self.sums)
         summed = np.add(step, *total, dtype=np.float64) if total else step
         return np.divide(summed, counts).astype(np.float32)

@@ -50,7 +50,8 @@ _CLIP_DISTANCE0 = 0x3000
 class GBufferVariant:
     """What the pass is compiled for.
 
-    cutout: some opacity is below 1; color_varies: displayColor a vertex; texture_groups: 0 without textures.
+    cutout: some opacity is below 1; transparent: and scales the diffuse alone; color_varies: displayColor a vertex.
+    texture_groups: 0 without textures.
     clipping_planes: how many the camera has.
     """
 
@@ -61,10 +62,13 @@ class GBufferVariant:
     texture_groups: int = 0
     space: RenderSpace = REC709
     clipping_planes: int = 0
+    transparent: bool = False
+    orthographic: bool = False
 
     @property
     def defines(self) -> list[str]:
         flags = ["CUTOUT"] * self.cutout + ["DISPLAY_COLOR_VARIES"] * self.color_varies
+        flags += ["TRANSPARENT", "POSITION"] * self.transparent + ["ORTHOGRAPHIC"] * self.orthographic
         flags += ["TEXTURES", "POSITION"] * bool(self.texture_groups)
         flags += [f"CLIPPING_PLANES {self.clipping_planes}"] * bool(self.clipping_planes)
         inputs = [name for plane in self.planes for name in plane.inputs]

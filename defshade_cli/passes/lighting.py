@@ -45,6 +45,8 @@ _NO_IES = 0xFFFFFFFF
 class LightingVariant:
     """What the pass is compiled for.
 
+    shaped: cones, focus or profiles of IES.  profiles: some point does not shine alike all around.
+    patches: points stand for some area of their light, and samples for some of their pixel.  sky: points of a dome.
     volumes: the kinds that some light has.  outputs: layers beside the radiance.  groups: those that one light is in.
     """
 
@@ -55,6 +57,10 @@ class LightingVariant:
     shadows: bool
     shadow_styles: bool
     ies: bool
+    shaped: bool
+    profiles: bool
+    patches: bool
+    sky: bool
     volumes: tuple[Volume, ...]
     outputs: tuple[str, ...] = ()
     groups: int = 0
@@ -63,6 +69,8 @@ class LightingVariant:
     @classmethod
     def of(cls, plan: Plan) -> LightingVariant:
         orthographic = plan.camera.projection == "orthographic"
+        lights = [planned.light for planned in plan.lights]
+        patches = plan.samples > 1 or any(planned.points > 1 for planned in plan.lights)
         return cls(
             plan.planes,
             plan.layout,
@@ -71,6 +79,10 @@ class LightingVariant:
             plan.shadows,
             plan.shadow_styles,
             bool(plan.profiles),
+            any(light.shaping for light in lights),
+            patches or any(light.profile != "uniform" for light in lights),
+            patches,
+            patches and bool(plan.domes),
             plan.volumes,
             plan.outputs,
             plan.most_groups,
@@ -84,6 +96,10 @@ class LightingVariant:
             ["SHADOWS"] * self.shadows
             + ["SHADOW_STYLES"] * self.shadow_styles
             + ["IES"] * self.ies
+            + ["SHAPED"] * self.shaped
+            + ["PROFILES"] * self.profiles
+            + ["PATCHES"] * self.patches
+            + ["SKY"] * self.sky
             + space_defines(self.space)
         )
         return [plane.define for plane in self.planes] + flags + output_defines(self.outputs)
@@ -105,7 +121,7 @@ class LightingPass:
             defines = variant.defines + ["VOLUME_QUAD"] * (volume == "quad")
             files = (f"light_{volume}.vert", "lighting.frag")
             program = gpu.shaders.program(*files, defines=defines, generated=generated)
-            self._volumes[volume] = screen.array(program) if volume == "quad" else _volume_array(gpu, volume, program)
+            self._volumes[volume] = screen.array(program) if volume == "quad" else volume_array(gpu, volume, program)
 
     def begin(self, gbuffer: GBuffer, targets: LightTargets) -> None:
         """Emission and coverage: the sample's radiance is overwritten, and the group of what is emitted grows."""
@@ -154,7 +170,8 @@ class LightingPass:
         array.render(instances=count)
 
 
-def _volume_array(gpu: Gpu, volume: Volume, program: moderngl.Program) -> moderngl.VertexArray:
+def volume_array(gpu: Gpu, volume: Volume, program: moderngl.Program) -> moderngl.VertexArray:
+    """The polyhedron around a sphere or a cone, for a program that reads its `corner`s."""
     corners, triangles = sphere_volume() if volume == "sphere" else cone_volume()
     vertices = gpu.keep(gpu.context.buffer(corners.tobytes()))
     indices = gpu.keep(gpu.context.buffer(triangles.tobytes()))
@@ -172,7 +189,9 @@ def light_records(
     records = np.zeros(len(lights), record("Light"))
     for row, planned, emitter in zip(records, lights, emitters, strict=True):
         row["position"], row["axis"], row["facing"] = emitter.position - eye, emitter.axis, emitter.facing
-        row["profile"], row["intensity"] = _PROFILES.index(emitter.profile), emitter.intensity
+        row["profile"] = _PROFILES.index(emitter.profile)
+        with np.errstate(over="ignore"):  # an infinity in the image is found after the frame, with its light
+            row["intensity"] = emitter.intensity
         row["response"] = (planned.light.diffuse, planned.light.specular)
         aside = float(np.linalg.norm(emitter.position - planned.light.position))
         row["reach"], row["extent"] = planned.reach + aside, emitter.extent

@@ -13,6 +13,7 @@ from defshade_cli.gpu.planes import MOST_TARGETS, Plane
 from defshade_cli.gpu.residence import LIGHTS, MOTIONS, VIEW, DrawList, GpuScene, RecordBuffer
 from defshade_cli.image.film import Film, Sampling
 from defshade_cli.passes.accumulation import AccumulationPass
+from defshade_cli.passes.debug_volumes import DebugVolumesPass, laid_over
 from defshade_cli.passes.emitters import LitSample, light_batches
 from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
 from defshade_cli.passes.frame import Frame
@@ -24,12 +25,13 @@ from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.motion import motion_records, neighbouring_points
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
-from defshade_cli.passes.screen import Screen, TileMask
-from defshade_cli.passes.shadows import ShadowAtlas, ShadowPass
+from defshade_cli.passes.screen import WHOLE, Screen, TileMask
+from defshade_cli.passes.shadows import ShadowAtlas, ShadowPass, ShadowVariant
 from defshade_cli.passes.stopping import Stopping
 from defshade_cli.passes.tables import LightTables, TableStore
 from defshade_cli.passes.view import view_record
 from defshade_cli.plan import Plan, ShutterSample
+from defshade_cli.scene.emission import far_field
 from defshade_cli.scene.scene import Scene
 
 Layers = dict[str, NDArray[np.float32]]
@@ -50,13 +52,10 @@ class Pipeline:
         self._gbuffer_pass = cache(lambda variant: GBufferPass(gpu, variant))
         self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant, self._screen))
         self._environment_pass = cache(lambda variant: EnvironmentPass(gpu, variant, self._screen))
-        self._shadow_pass = cache(
-            lambda cutout, color_varies, texture_groups, linked: ShadowPass(
-                gpu, cutout=cutout, color_varies=color_varies, texture_groups=texture_groups, linked=linked
-            )
-        )
+        self._shadow_pass = cache(lambda variant: ShadowPass(gpu, variant))
         self._tables = TableStore(gpu)
         self._accumulation = AccumulationPass(gpu, self._frame, self._screen)
+        self._debug_volumes_pass = cache(lambda: DebugVolumesPass(gpu))
         self._stopping = Stopping(gpu, self._frame, self._screen, self._mask)
 
     def upload(self, scene: Scene, plan: Plan) -> DrawList:
@@ -142,6 +141,8 @@ class Pipeline:
                 break
         sampling, counts, variance = self._stopping.finish(self._accumulation.count)
         beauty = self._accumulation.mean(counts)
+        if plan.debug == "volumes":
+            beauty = laid_over(beauty, self._volumes(draws, plan, tables, gbuffer))
         layers = {"beauty": beauty, "alpha": beauty[..., 3:]} | targets.layers(counts)
         layers |= {"variance": variance, "sampleCount": counts.astype(np.float32)}
         return layers | mattes.layers(self._accumulation.count), mattes.manifests(), sampling
@@ -168,13 +169,30 @@ class Pipeline:
             self._lights.write(light_records(lights, emitters, plan.camera.position, shadows, tables))
             lighting.add(lights, gbuffer, targets, shadows, tables)
 
+    def _volumes(self, draws: DrawList, plan: Plan, tables: LightTables, gbuffer: GBuffer) -> NDArray[np.float32]:
+        """The light volumes as the pixels' centres see them, domes apart."""
+        self._mask.hide(WHOLE[:0])
+        self._draw_gbuffer(draws, plan, gbuffer, CENTRE)
+        lights = [planned for planned in plan.lights if planned not in plan.domes]
+        emitters = [far_field(planned.light) for planned in lights]
+        self._lights.write(light_records(lights, emitters, plan.camera.position, None, tables))
+        target = self._frame.radiance("debug", plan.size, gbuffer)
+        return self._debug_volumes_pass().draw(lights, target, gbuffer.layout)
+
     def _shadow_maps(
         self, draws: DrawList, batch: list[LitSample], plan: Plan, sample: Sample, tables: LightTables
     ) -> ShadowAtlas:
-        shadow_pass = self._shadow_pass(plan.cutout, draws.color_varies, draws.texture_groups, plan.shadow_linked)
+        variant = ShadowVariant(
+            plan.cutout,
+            plan.transparent,
+            draws.color_varies,
+            draws.texture_groups,
+            plan.shadow_linked,
+            plan.render_space,
+        )
         cameras = [lit.shadow_cameras for lit in batch]
         casters = [tables.links.casts.get(lit.planned.light, ALL_LINKED) for lit in batch]
-        return shadow_pass.draw(draws, cameras, sample.texel_offset, casters)
+        return self._shadow_pass(variant).draw(draws, cameras, sample.texel_offset, casters)
 
     def _data_planes(self, draws: DrawList, plan: Plan) -> Planes:
         """Planes for the data layers: the beauty's own where it drew them in float at the pixels' centres.
@@ -203,5 +221,7 @@ class Pipeline:
             draws.texture_groups,
             plan.render_space,
             len(plan.camera.clipping_planes),
+            plan.transparent,
+            plan.camera.projection == "orthographic",
         )
         self._gbuffer_pass(variant).draw(draws, gbuffer, self._mask, plan.camera, whole=bool(plan.mattes))

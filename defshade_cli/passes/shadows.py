@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.records import record
+from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.residence import SHADOW_MAPS, DrawList, RecordBuffer
 from defshade_cli.gpu.textures import textures_source
+from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.view import clip_from_camera, depth_coefficients
 from defshade_cli.scene.camera import Camera, Projection
 from defshade_cli.scene.emission import Emitter
@@ -145,19 +147,32 @@ class ShadowAtlas:
     count: NDArray[np.uint32]
 
 
+@dataclass(frozen=True, slots=True)
+class ShadowVariant:
+    """What the pass is compiled for: the terms of GBufferVariant. linked: a light chooses its casters."""
+
+    cutout: bool
+    transparent: bool
+    color_varies: bool
+    texture_groups: int
+    linked: bool
+    space: RenderSpace = REC709
+
+    @property
+    def defines(self) -> list[str]:
+        read = ["TRANSPARENT"] * self.transparent + ["DISPLAY_COLOR_VARIES"] * self.color_varies
+        read += ["TEXTURES"] * bool(self.texture_groups) + space_defines(self.space)
+        return (["CUTOUT", *read] if self.cutout else []) + ["LINKS"] * self.linked
+
+
 class ShadowPass:
     """Draws shadow maps into an atlas of CAPACITY tiles; what one call draws the next overwrites."""
 
-    def __init__(
-        self, gpu: Gpu, *, cutout: bool, color_varies: bool, texture_groups: int = 0, linked: bool = False
-    ) -> None:
-        defines = ["CUTOUT"] * cutout + ["DISPLAY_COLOR_VARIES"] * (cutout and color_varies)
-        defines += ["TEXTURES"] * (cutout and texture_groups > 0)
-        defines += ["LINKS"] * linked
-        generated = {"generated/textures.glsl": textures_source(texture_groups)}
+    def __init__(self, gpu: Gpu, variant: ShadowVariant) -> None:
+        generated = {"generated/textures.glsl": textures_source(variant.texture_groups)}
         size = (TILES * RESOLUTION, TILES * RESOLUTION)
         self._context = gpu.context
-        self._program = gpu.shaders.program("shadow.vert", "shadow.frag", defines=defines, generated=generated)
+        self._program = gpu.shaders.program("shadow.vert", "shadow.frag", defines=variant.defines, generated=generated)
         self._depth = gpu.keep(gpu.depth_texture(size))
         self._framebuffer = gpu.keep(gpu.context.framebuffer([], self._depth))
         self._maps = RecordBuffer(gpu, SHADOW_MAPS)
@@ -185,10 +200,10 @@ class ShadowPass:
             records = np.zeros(len(maps), record("ShadowMap"))
             for tile, camera in enumerate(maps):
                 records[tile] = _map_record(camera, tile, jitter)
-            self._draw_maps(draws, records, np.repeat(casters, count) if len(casters) else np.array([]))
+            self._draw_maps(draws, maps, records, np.repeat(casters, count) if len(casters) else np.array([]))
         return ShadowAtlas(self._depth, first, count)
 
-    def _draw_maps(self, draws: DrawList, records: NDArray, casters: NDArray) -> None:
+    def _draw_maps(self, draws: DrawList, maps: Sequence[Camera], records: NDArray, casters: NDArray) -> None:
         """Each map with the commands that it may see."""
         commands = [draws.table[_may_see(m, draws.corners)] for m in records["clip_from_relative"]]
         self._write_commands(np.concatenate(commands))
@@ -201,6 +216,8 @@ class ShadowPass:
             x, y = tile % TILES, tile // TILES
             self._framebuffer.viewport = (x * RESOLUTION, y * RESOLUTION, RESOLUTION, RESOLUTION)
             self._program["clip_from_relative"] = tuple(row["clip_from_relative"].ravel().tolist())
+            if "towards_light" in self._program:
+                self._program["towards_light"] = _towards(maps[tile])
             if "first_caster" in self._program:
                 self._program["first_caster"] = int(casters[tile])
             if len(seen):
@@ -214,6 +231,12 @@ class ShadowPass:
         data = commands.tobytes()
         self._commands.orphan(max(len(data), self._commands.size))
         self._commands.write(data)
+
+
+def _towards(camera: Camera) -> tuple[float, ...]:
+    """The light of a map: (position, 1), or (direction, 0) of one that is far away."""
+    distant = camera.projection == "orthographic"
+    return (*camera.world_from_camera[:3, 2 if distant else 3].tolist(), 0.0 if distant else 1.0)
 
 
 def _map_record(camera: Camera, tile: int, jitter: tuple[float, float]) -> NDArray:

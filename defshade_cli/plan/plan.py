@@ -18,13 +18,15 @@ from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.groups import light_groups, light_outputs
 from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
 from defshade_cli.plan.moments import count_moments, share_moments
+from defshade_cli.plan.opacity import is_transparent, thin_materials
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import DomeLight
+from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.shadow import PLAIN
 from defshade_cli.scene.window import DataWindow, from_ndc
-from defshade_cli.settings import FILTERS, Complexity, Filter, Layout, RenderSettings, Shading
+from defshade_cli.settings import FILTERS, Complexity, Debug, Filter, Layout, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
 from defshade_cli.units import exposure_scale
 
@@ -46,11 +48,13 @@ class Plan:
     lights: sorted quads, spheres, cones.
     shadows: some light casts them.  shadow_linked: in some light not all geometry does.
     background: domes are seen where no geometry is.
-    cutout: some opacity may be below 1.  textures: some material reads them.
+    cutout: some opacity may be below 1.  transparent: and scales the diffuse alone.
+    textures: some material reads them.
     data_pass: data layers need an unjittered float GBuffer of their own.
     portals: how many hints for sampling domes the stage has.
     levels: how often subdivision surfaces were refined, ascending; empty without any.
     ranks: (id, coverage) pairs of a Cryptomatte.
+    debug: of RenderSettings.
     """
 
     display: tuple[int, int]
@@ -76,12 +80,14 @@ class Plan:
     shadow_linked: bool
     background: bool
     cutout: bool
+    transparent: bool
     textures: bool
     data_pass: bool
     complexity: Complexity
     portals: int
     levels: tuple[int, ...]
     ranks: int
+    debug: Debug | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -171,6 +177,7 @@ class Plan:
         before = ("gbuffer", "emission", *("environment",) * bool(self.domes), *("shadow maps",) * self.shadows)
         lighting = before + tuple(f"light {volume}" for volume in self.volumes)
         accumulation = ("accumulation",) * (self.samples > 1) + ("batch means",) * self.tracks_error
+        accumulation += (f"debug {self.debug}",) * (self.debug is not None)
         return (lighting + accumulation if self.sampled else ()) + ("data gbuffer",) * self.data_pass
 
     @property
@@ -188,8 +195,8 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     camera = replace(display_camera, window=window.of(display_camera.window, display))
     exposure = camera.exposure * exposure_scale(settings.exposure)
     lights = _seen_lights(plan_lights(scene, exposure, settings, layers), layers)
-    cutout = _has_cutout(scene)
-    planes, data_planes, data_pass = _divide_planes(scene, settings, layers, cutout)
+    thin = thin_materials(scene)
+    planes, data_planes, data_pass = _divide_planes(scene, settings, layers, thin)
     shadows = settings.shadows and bool(scene.drawables) and any(p.light.casts_shadow for p in lights)
     return Plan(
         display=display,
@@ -214,11 +221,13 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         shadows=shadows,
         shadow_linked=shadows and scene.shadow_linked,
         background=settings.background,
-        cutout=cutout,
+        cutout=bool(thin),
+        transparent=is_transparent(thin, settings.shading),
         textures=bool(scene.textures),
         data_pass=data_pass,
         complexity=settings.complexity,
         ranks=settings.cryptomatte_levels,
+        debug=settings.debug,
         portals=len(scene.portals),
         levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None})),
     )
@@ -231,7 +240,7 @@ ShutterSample = tuple[Scene, Plan]
 def plan_moments(plan: Plan, seen: Iterator[Scene], settings: RenderSettings) -> Iterator[ShutterSample]:
     """What the samples see in turn: `seen` with plans that fill the same planes."""
     for moment in seen:
-        yield moment, replace(make_plan(moment, settings), planes=plan.planes)
+        yield moment, replace(make_plan(moment, settings), planes=plan.planes, transparent=plan.transparent)
 
 
 def _seen_lights(lights: tuple[PlannedLight, ...], layers: tuple[str, ...]) -> tuple[PlannedLight, ...]:
@@ -247,7 +256,7 @@ def primvar_names(layers: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _divide_planes(
-    scene: Scene, settings: RenderSettings, layers: tuple[str, ...], cutout: bool
+    scene: Scene, settings: RenderSettings, layers: tuple[str, ...], thin: tuple[Material, ...]
 ) -> tuple[tuple[Plane, ...], tuple[Plane, ...], bool]:
     """Planes of the samples' GBuffer, planes of the data layers, and whether these need a GBuffer of their own.
 
@@ -255,7 +264,7 @@ def _divide_planes(
     are too many.
     """
     rows = [LAYERS[name] for name in layers]
-    lit = _lit_planes(scene) if any(row.source == "lighting" for row in rows) else ()
+    lit = _lit_planes(scene, settings, thin) if any(row.source == "lighting" for row in rows) else ()
     lit += named_planes("visible" for row in rows if row.source == "matte")
     shown = primvar_names(layers)
     if len(shown) > MOST_PRIMVARS:
@@ -263,22 +272,15 @@ def _divide_planes(
     data = named_planes([row.source for row in rows] + [f"primvar_{i}" for i in range(len(shown))])
     both = named_planes(plane.name for plane in (*lit, *data))
     sampled, has_data = any(row.is_sampled for row in rows), not all(row.is_sampled for row in rows)
-    exact = settings.layout == "float" and settings.most_samples == 1 and not cutout and len(both) <= MOST_TARGETS
+    exact = settings.layout == "float" and settings.most_samples == 1 and not thin and len(both) <= MOST_TARGETS
     data_pass = has_data and not (sampled and exact)
     return (lit if data_pass or not has_data else both), data, data_pass
 
 
-def _lit_planes(scene: Scene) -> tuple[Plane, ...]:
+def _lit_planes(scene: Scene, settings: RenderSettings, thin: tuple[Material, ...]) -> tuple[Plane, ...]:
     names = [plane.name for plane in needed_planes(scene.materials)]
-    return named_planes([*names, *["links"] * scene.light_linked])
-
-
-def _has_cutout(scene: Scene) -> bool:
-    if any(m.opacity < 1.0 or m.opacity_threshold > 0.0 or "opacity" in m.inputs for m in scene.materials):
-        return True
-    varying = [m.display_opacity for m in scene.meshes if m.display_opacity is not None]
-    constant = [d.display_opacity for d in scene.drawables]
-    return any(m.uses_display_opacity for m in scene.materials) and any((o < 1.0).any() for o in varying + constant)
+    weights = ["weights"] * is_transparent(thin, settings.shading)
+    return named_planes([*names, *["links"] * scene.light_linked, *weights])
 
 
 def _tight_clip(camera: Camera, bounds: NDArray[np.float64]) -> tuple[float, float]:

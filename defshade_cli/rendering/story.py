@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from defshade_cli import __version__
-from defshade_cli.errors import DefshadeError, UsageError
+from defshade_cli.errors import DefshadeError, UnsoundImage, UsageError
 from defshade_cli.farm.open_job import OpenJob
 from defshade_cli.farm.shots import Shot
 from defshade_cli.farm.targets import FINGERPRINT, check_outputs, is_done, remove_leftovers, shot_files, shot_paths
@@ -22,23 +22,30 @@ from defshade_cli.plan import Plan, make_plan, plan_moments
 from defshade_cli.rendering.pictures import shown
 from defshade_cli.rendering.renderer import Renderer
 from defshade_cli.rendering.results import FrameResult, ImageResult
+from defshade_cli.rendering.soundness import sound
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Composition, OutputSettings, RenderJob, RenderSettings
+
+_FOR_FILES = ("check", "show", "write")
+"""Steps that turn a film into files."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Drawn:
-    """An image that is drawn and not yet written."""
+    """An image that is drawn and not yet written. fault: what is wrong with it, to be said once it is written."""
 
     shot: Shot
     film: Film
     plan: Plan
     seconds: dict[str, float]
+    fault: str = ""
 
     def written(self) -> ImageResult:
         with _timed(self.seconds, "write"):
             files = (file for path in shot_paths(self.shot) for file in write(self.film, self.shot.job.output, path))
             paths = tuple(files)
+        if self.fault:
+            raise UnsoundImage(f"{paths[0] if paths else self.film.scene_name}: {self.fault}")
         return ImageResult(paths, film=self.film, plan=self.plan, seconds=self.seconds)
 
 
@@ -86,7 +93,7 @@ def time_steps(job: RenderJob) -> dict[str, float]:
     """
     with closing(run(replace(job, frames=job.frames[:1], output=OutputSettings()))) as results:
         seconds = next(results).seconds
-    return {step: taken for step, taken in seconds.items() if step != "write"}
+    return {step: taken for step, taken in seconds.items() if step not in _FOR_FILES}
 
 
 def render(
@@ -168,14 +175,19 @@ def _draw(shot: Shot, opened: OpenJob, renderer: Renderer, command: str) -> _Dra
     with _timed(seconds, "draw"):
         moments = plan_moments(plan, reader.read_shutter(scene, plan.moments), job.settings)
         film = pipeline.render(scene, plan, moments, uploaded)
+    with _timed(seconds, "check"):
+        checked = sound(film, scene, job.settings, pipeline, job.output.on_nan)
     with _timed(seconds, "show"):
-        film = shown(film, shot, renderer)
-    facts = _provenance(shot, command) | film.metadata | _cost(plan, seconds["draw"]) | {FINGERPRINT: made_of}
-    return _Drawn(shot, replace(film, metadata=facts), plan, seconds)
+        film = shown(checked.film, shot, renderer)
+    facts = _provenance(shot, scene, command) | film.metadata | _cost(plan, seconds["draw"])
+    if not checked.fault:
+        facts |= {FINGERPRINT: made_of}
+    fault = checked.fault if job.output.on_nan == "error" else ""
+    return _Drawn(shot, replace(film, metadata=facts), plan, seconds, fault)
 
 
-def _provenance(shot: Shot, command: str) -> dict[str, Any]:
-    facts = {"version": __version__, "command": command, "stage": shot.job.stage.name}
+def _provenance(shot: Shot, scene: Scene, command: str) -> dict[str, Any]:
+    facts = {"version": __version__, "command": command, "stage": shot.job.stage.name, "lights": scene.lit_by}
     product = {"product": shot.product.path} if shot.product.path else {}
     return facts | product | shot.job.composition.choices
 

@@ -14,8 +14,13 @@ def frozen(values: Any, dtype: DTypeLike, *shape: int) -> NDArray:
     Raises ValueError where the shape differs. Copies only where it must; the caller's array stays writable.
     """
     array = np.ascontiguousarray(values, dtype=dtype)
-    if len(shape) != array.ndim or any(want not in (-1, have) for want, have in zip(shape, array.shape, strict=True)):
-        raise ValueError(f"expected shape {shape}, got {array.shape}")
+    found = array.shape
+    if shape != found and (len(shape) != len(found) or not all(map(_fits, shape, found))):
+        raise ValueError(f"expected shape {shape}, got {found}")
     array = array.view()
     array.flags.writeable = False
     return array
+
+
+def _fits(wanted: int, found: int) -> bool:
+    return wanted in (-1, found)

@@ -62,10 +62,15 @@ class Material:
     inputs: Mapping[str, TextureInput] = field(default_factory=dict, hash=False)
 
     @property
+    def is_transparent(self) -> bool:
+        """Does opacity scale the diffuse alone? A threshold takes the place of either mode."""
+        return self.opacity_mode == "transparent" and self.opacity_threshold == 0.0
+
+    @property
     def uv_names(self) -> tuple[str, ...]:
         """The primvars that its textures read, each once."""
         return tuple(dict.fromkeys(i.uv for i in self.inputs.values() if i.uv))
 
 
-UNBOUND = Material("<unbound>", uses_display_color=True, uses_display_opacity=True)
+UNBOUND = Material("<unbound>", opacity_mode="presence", uses_display_color=True, uses_display_opacity=True)
 """What a prim without a bound material is drawn with."""

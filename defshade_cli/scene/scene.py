@@ -39,6 +39,7 @@ class Scene:
     assets: path of a drawn prim → path of the component that it is part of; empty unless asked for.
     resolution, pixel_aspect, conform, data_window: of the stage's UsdRenderSettings, where it names one; the window
         is (xmin, ymin, xmax, ymax), 0..1 over the image, y up.
+    lit_by: whose the lights are: the `stage`'s, or ours, a `camera light` or a `studio`.
     purposes: of what is drawn.
     rendering_space: the colour space that they name; None for linear Rec.709, in which a Scene's colours are.
     """
@@ -66,6 +67,7 @@ class Scene:
     data_window: tuple[float, float, float, float] = WHOLE_IMAGE
     purposes: tuple[str, ...] = ("default", "render")
     rendering_space: str | None = None
+    lit_by: str = "stage"
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:

@@ -7,15 +7,17 @@ after its last, 2 P₀ − P₁ and 2 Pₙ₋₁ − Pₙ₋₂.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from defshade_cli.usd.polygons import Primvar
 
-Weights: TypeAlias = sparse.csr_array
+if TYPE_CHECKING:  # scipy is a quarter of a second to import, and not every stage has curves
+    from scipy import sparse
+
+Weights: TypeAlias = "sparse.csr_array"
 
 LARGEST_DETAIL = 8
 
@@ -129,7 +131,7 @@ def _vertex_weights(
     phantom = points + 2 * curve[:, None]
     column = np.where(own < 0, phantom, np.where(own >= counts[curve, None], phantom + 1, column))
     row = np.repeat(np.arange(len(curve)), size)
-    extended = sparse.csr_array((weights.ravel(), (row, column.ravel())), shape=(len(curve), points + 2 * len(counts)))
+    extended = _sparse(weights.ravel(), row, column.ravel(), (len(curve), points + 2 * len(counts)))
     return extended @ _with_phantoms(first, counts, points)
 
 
@@ -142,7 +144,7 @@ def _with_phantoms(first: NDArray[np.int64], counts: NDArray[np.int64], points: 
     column = np.concatenate([np.arange(points), start, start + 1, end, end - 1])
     ones = np.ones(len(curve))
     weight = np.concatenate([np.ones(points), 2 * ones, -ones, 2 * ones, -ones])
-    return sparse.csr_array((weight, (row, column)), shape=(points + 2 * len(counts), points))
+    return _sparse(weight, row, column, (points + 2 * len(counts), points))
 
 
 def _varying_weights(
@@ -158,4 +160,10 @@ def _varying_weights(
     row = np.tile(np.arange(len(curve)), 2)
     column = np.concatenate([first + segment, first + following])
     weight = np.concatenate([1.0 - t, t])
-    return sparse.csr_array((weight, (row, column)), shape=(len(curve), int(varying_counts.sum())))
+    return _sparse(weight, row, column, (len(curve), int(varying_counts.sum())))
+
+
+def _sparse(weight: NDArray, row: NDArray, column: NDArray, shape: tuple[int, int]) -> Weights:
+    from scipy import sparse
+
+    return sparse.csr_array((weight, (row, column)), shape=shape)

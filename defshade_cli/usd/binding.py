@@ -7,7 +7,7 @@ of the instance by the same rule: the nearest wins, unless one from above is str
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from pxr import Sdf, Usd, UsdShade
@@ -41,6 +41,8 @@ class Bindings(NamedTuple):
 
     def candidates_for(self, purposes: Sequence[str]) -> tuple[Sdf.Path, ...]:
         """Material paths in the order of `purposes`, as UsdRenderSettings names them."""
+        if not any(self):
+            return ()
         by_purpose = {"full": self.full, "preview": self.preview, "": self.all_purpose, "allPurpose": self.all_purpose}
         chosen = (by_purpose.get(purpose) for purpose in purposes)
         return tuple(binding.material for binding in chosen if binding)
@@ -59,13 +61,18 @@ class Bound(NamedTuple):
 NOTHING_ABOVE = Bound(NOTHING_BOUND, by_collection=False)
 
 
-def read_bound(prim: Usd.Prim, above: Bound) -> Bound:
-    """Of `prim`, whose parent has `above`: the same, unless it has bindings of its own or a collection may hold it."""
-    own = prim.GetAuthoredPropertiesInNamespace("material")
+def read_bound(stage: Usd.Stage, path: str, above: Bound, said: Collection[str] | None = None) -> Bound:
+    """Of a prim whose parent has `above`: the same, unless it has bindings of its own or a collection may hold it.
+
+    said: names of the properties authored on it, where they are known.
+    """
+    if said is None:
+        said = stage.GetPrimAtPath(path).GetAuthoredPropertyNames()
+    own = [name for name in said if name.startswith("material:")]
     if not own and not above.by_collection:
         return above
-    by_collection = above.by_collection or any(":collection:" in each.GetName() for each in own)
-    return Bound(_resolve(prim), by_collection)
+    by_collection = above.by_collection or any(":collection:" in name for name in own)
+    return Bound(_resolve(stage.GetPrimAtPath(path)), by_collection)
 
 
 def _resolve(prim: Usd.Prim) -> Bindings:

@@ -15,8 +15,9 @@ from pxr import Gf, Sdf, Usd, UsdGeom
 
 from defshade_cli.errors import PrimNotFound, StageError
 from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.framing import world_from_front
 from defshade_cli.scene.scene import Unsupported
-from defshade_cli.spaces import rigid, translation
+from defshade_cli.spaces import Window, rigid, translation
 from defshade_cli.usd.values import is_finite
 from defshade_cli.usd.xform import matrix
 
@@ -28,7 +29,6 @@ FRAMED = "<framed>"
 MOST_CLIPPING_PLANES = 8
 """What OpenGL asks of every driver."""
 
-_Z_UP_FROM_FRONT = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], np.float64)
 _USABLE_CLIPPING = (1.0, 1.0e6)  # UsdGeomCamera's fallback
 _NEAREST = 1e-6  # near plane over far plane, where the authored one is not in front of the camera
 
@@ -98,13 +98,18 @@ def framed_camera(bounds: NDArray[np.float64], up_axis: str) -> Camera:
     diagonal of the front face fits the horizontal field of view), or what a tall box needs, which usdrecord crops.
     """
     box = bounds if np.isfinite(bounds).all() else np.array([[-0.5] * 3, [0.5] * 3])
-    world_from_front = _Z_UP_FROM_FRONT if up_axis == "Z" else np.eye(4)
-    width, height, depth = np.abs((box[1] - box[0]) @ world_from_front[:3, :3])
-    window = _window(Gf.Camera(), FRAMED)
+    upright = world_from_front(up_axis)
+    width, height, depth = np.abs((box[1] - box[0]) @ upright[:3, :3])
+    window = default_window()
     front = max(math.hypot(width, height) / 2 / window[1], height / 2 / window[3]) or max(depth, 1.0)
     back = translation(np.array([0.0, 0.0, front + depth / 2]))
-    world_from_camera = translation(box.mean(axis=0)) @ world_from_front @ back
+    world_from_camera = translation(box.mean(axis=0)) @ upright @ back
     return Camera(FRAMED, world_from_camera, window, clipping_range=(front / 2, 2 * (front + depth)))
+
+
+def default_window() -> Window:
+    """Of a camera with nothing authored: 50 mm on 20.955 x 15.2908 mm."""
+    return _window(Gf.Camera(), FRAMED)
 
 
 def _is_camera(prim: Usd.Prim) -> bool:

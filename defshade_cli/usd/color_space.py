@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pxr import Gf, Usd, Vt
 
 from defshade_cli.scene.texture import ColorSpace
@@ -22,9 +23,12 @@ def is_color(attribute: Usd.Attribute) -> bool:
 
 def in_rec709(attribute: Usd.Attribute, value: Any) -> Any:
     """A colour that `attribute` holds, or an array of them, in linear Rec.709; as it is where it is in that already."""
-    space = _space_of(attribute)
-    if space is None or value is None:
-        return value
+    space = space_named(_name_of(attribute))
+    return value if space is None or value is None else rec709_of(space, value)
+
+
+def rec709_of(space: Gf.ColorSpace, value: Any) -> NDArray[np.float32]:
+    """(..., 3 or more) whose first three channels go from `space` to linear Rec.709."""
     colors = np.array(value, np.float32)
     span = Vt.FloatArray.FromNumpy(np.ascontiguousarray(colors[..., :3]).ravel())
     space.ConvertRGBSpan(_REC709, span)
@@ -34,20 +38,29 @@ def in_rec709(attribute: Usd.Attribute, value: Any) -> Any:
 
 def texture_space(attribute: Usd.Attribute) -> ColorSpace:
     """What an image file's attribute says of its texels; `auto` where it says nothing."""
-    space = _space_of(attribute)
+    name = _name_of(attribute)
+    return texture_space_of(name) if name else "auto"
+
+
+def texture_space_of(name: str) -> ColorSpace:
+    """The space of texels by USD's name for it; `raw` for linear Rec.709, for data, and for unknown names."""
+    space = space_named(name)
     if space is None:
-        return "raw" if _name_of(attribute) else "auto"
+        return "raw"
     return "sRGB" if space == _SRGB else str(space.GetName())
+
+
+def space_named(name: str) -> Gf.ColorSpace | None:
+    """None for linear Rec.709, for data, and for a name that USD does not know."""
+    if not name or not is_known(name):
+        return None
+    space = Gf.ColorSpace(name)
+    return None if space == _REC709 or space.IsData() else space
+
+
+def is_known(name: str) -> bool:
+    return bool(Gf.ColorSpace.IsValid(name))
 
 
 def _name_of(attribute: Usd.Attribute) -> str:
     return str(Usd.ColorSpaceAPI.ComputeColorSpaceName(attribute, None))
-
-
-def _space_of(attribute: Usd.Attribute) -> Gf.ColorSpace | None:
-    """None for linear Rec.709, for data, and for a name that USD does not know."""
-    name = _name_of(attribute)
-    if not name or not Gf.ColorSpace.IsValid(name):
-        return None
-    space = Gf.ColorSpace(name)
-    return None if space == _REC709 or space.IsData() else space

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
 from defshade_cli.usd.polygons import Polygons
+from defshade_cli.usd.said import Said
 from defshade_cli.usd.subdivision import LinearInterpolation, Topology
 from defshade_cli.usd.subdivision.topology import BoundaryRule, SchemeName, TriangleRule
 from defshade_cli.usd.values import floats, integers
@@ -51,11 +52,13 @@ class Control:
         return int(counts.sum(dtype=np.int64)) * 2 * 4 ** (level - 1)
 
 
-def read_control(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode, issues: list[str]) -> Control | None:
+def read_control(
+    mesh: UsdGeom.Mesh, said: Said, polygons: Polygons, time: Usd.TimeCode, issues: list[str]
+) -> Control | None:
     """None where the polygons are the surface, and where what is authored describes none."""
     if polygons.scheme == "none" or not len(polygons.counts):
         return None
-    says_more = not set(CONTROL_ATTRIBUTES).isdisjoint(mesh.GetPrim().GetAuthoredPropertyNames())
+    says_more = not set(CONTROL_ATTRIBUTES).isdisjoint(said.names)
     try:
         topology = _read_topology(mesh, polygons, time) if says_more else _plain_topology(polygons)
     except ValueError as error:

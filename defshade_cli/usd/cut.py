@@ -10,7 +10,7 @@ import numpy as np
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.subsets import FaceGroup, Faces
-from defshade_cli.usd.triangulation import triangulate
+from defshade_cli.usd.triangulation import Triangles, triangulate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,11 +51,14 @@ class Cut:
         return same and next(named) == next(named)
 
 
-def cut(polygons: Polygons, faces: Faces, path: str) -> Cut:
-    """Triangles over the points, or over the corners where something on the mesh splits points."""
+def cut(polygons: Polygons, faces: Faces, path: str, triangles: Triangles | None = None) -> Cut:
+    """Triangles over the points, or over the corners where something on the mesh splits points.
+
+    triangles: of polygons without holes, where they are known.
+    """
     issues: list[str] = []
     whole = polygons.without_holes().joined()
-    corners, face = triangulate(whole, issues)
+    corners, face = triangles or triangulate(whole, issues)
     if whole.left_handed:
         corners = corners[:, ::-1]
     split = any(primvar.splits_points for primvar in whole.primvars)

@@ -6,7 +6,9 @@ Surface ── refiner ── normals ── cut ──→ Gprim      as finely 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +37,10 @@ from defshade_cli.usd.primvars import (
     read_shown,
 )
 from defshade_cli.usd.refiner import Refiner
+from defshade_cli.usd.said import Said, said_of
 from defshade_cli.usd.shapes import Shapes
 from defshade_cli.usd.sharing import shared
+from defshade_cli.usd.small_meshes import Shaped
 from defshade_cli.usd.subsets import FaceGroup, Faces, material_subsets, read_faces
 
 __all__ = ["FaceGroup", "Gprim", "Surface", "is_time_varying", "read_surface", "tessellate"]
@@ -100,16 +104,20 @@ def read_surface(
     shapes: Shapes | None = None,
     *,
     as_cages: bool = False,
+    said: Said | None = None,
+    subsets: list[UsdGeom.Subset] | None = None,
 ) -> Surface | None:
     """The surface of `prim`; None for a type that is no supported surface. Bad data becomes issues, never raises.
 
     A surface of which nothing can be drawn has no groups, and issues that say why.
     color: primvar to take for displayColor.  shown: primvars for layers.
     shapes: of other prims, whose polygons it shares where they are equal.  as_cages: see gprims.read_solid.
+    said, subsets: of the prim, where they are known, see subsets.material_subsets.
     """
     issues: list[str] = []
     path = str(prim.GetPath())
-    polygons, copies = _read_shape(prim, time, issues, color, as_cages)
+    said = said or said_of(prim)
+    polygons, copies = _read_shape(prim, said, time, issues, color, as_cages)
     if polygons is None:
         return None
     if shown:
@@ -117,16 +125,16 @@ def read_surface(
     display_color, opacity = _constant(polygons.display_color), _constant(polygons.display_opacity)
     if shapes is not None:
         polygons = shapes.shared(polygons.without_constants())
-    is_mesh = prim.IsA(UsdGeom.Mesh)
-    control = read_control(UsdGeom.Mesh(prim), polygons, time, issues) if is_mesh else smooth_control(polygons)
-    faces = read_faces(prim, time, issues)
+    mesh = None if polygons.scheme == "none" else UsdGeom.Mesh(prim)
+    control = read_control(mesh, said, polygons, time, issues) if mesh else smooth_control(polygons)
+    faces = read_faces(prim, path, material_subsets(prim) if subsets is None else subsets, time, issues)
     return Surface(
         path=path,
         polygons=polygons,
         control=control,
         faces=faces,
         groups=faces.groups_of(polygons.without_holes().faces) if copies is None or len(copies.ids) else (),
-        double_sided=prim.HasProperty("doubleSided") and bool(prim.GetAttribute("doubleSided").Get()),
+        double_sided=_is_double_sided(prim, said),
         copies=copies,
         display_color=display_color,
         display_opacity=None if opacity is None else float(opacity),
@@ -140,14 +148,24 @@ def _elements(polygons: Polygons) -> Elements:
     return count_elements(whole * len(polygons.counts), len(polygons.points), whole * len(polygons.indices))
 
 
-def tessellate(surface: Surface, refiner: Refiner | None = None, last: Gprim | None = None) -> Gprim:
-    """The surface in triangles; without a refiner its cage. `last`: an earlier one, of which is kept what fits."""
-    refined = with_normals(refiner.refine(surface.polygons) if refiner else surface.polygons)
+def tessellate(
+    surface: Surface, refiner: Refiner | None = None, last: Gprim | None = None, shaped: Shaped | None = None
+) -> Gprim:
+    """The surface in triangles; without a refiner its cage.
+
+    last: an earlier one, of which is kept what fits.  shaped: what is known of polygons that are not refined.
+    """
+    if shaped:
+        refined = replace(surface.polygons, normals=shaped.normals)
+    else:
+        refined = with_normals(refiner.refine(surface.polygons) if refiner else surface.polygons)
     polygons = shared(refined, last.cut.polygons) if last else refined
     known = last.cut.moved(polygons, surface.faces) if last else None
-    made = known or cut(polygons, surface.faces, surface.path)
+    made = known or cut(polygons, surface.faces, surface.path, shaped and shaped.triangles)
     level = (refiner.level if refiner else 0) if surface.control else None
-    mesh = replace(made.mesh, double_sided=surface.double_sided, level=level)
+    mesh = made.mesh
+    if (mesh.double_sided, mesh.level) != (surface.double_sided, level):
+        mesh = replace(mesh, double_sided=surface.double_sided, level=level)
     return Gprim(mesh, made.groups, tuple(Unsupported(surface.path, issue) for issue in made.issues), made)
 
 
@@ -167,43 +185,67 @@ def only_points_vary(prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[st
     return prim.IsA(UsdGeom.Mesh) and varying_names(prim, color, shown) <= {"points", "velocities", "accelerations"}
 
 
-def is_time_varying(prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = ()) -> bool:
-    return bool(varying_names(prim, color, shown))
+def is_time_varying(
+    prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = (), said: Said | None = None
+) -> bool:
+    return bool(varying_names(prim, color, shown, said))
 
 
-def varying_names(prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = ()) -> set[str]:
+def varying_names(
+    prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = (), said: Said | None = None
+) -> set[str]:
     """Of what read_surface reads, primvars inherited and face subsets included, what may differ over time."""
-    primvars = (
-        UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals"),
-        UsdGeom.PrimvarsAPI(prim).GetPrimvar("widths"),
-        *_carried(prim, color),
-        *(UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name) for name in shown),
-    )
+    said = said or said_of(prim)
+    attributes = (prim.GetAttribute(name) for name in _attributes(prim) if name in said.names)
     subsets = (subset.GetIndicesAttr() for subset in material_subsets(prim))
-    sources = (*(prim.GetAttribute(name) for name in _attributes(prim)), *primvars, *subsets)
+    sources = (*attributes, *(_carried(prim, color, shown) if said.primvars else ()), *subsets)
     names = {str(source.GetName()) for source in sources if source and source.ValueMightBeTimeVarying()}
-    carried = prim.IsA(UsdGeom.PointBased) and is_carried_by_velocities(prim, Usd.TimeCode(0.0))
-    return names | {"velocities"} if carried else names
+    return names | {"velocities"} if _moves_by_velocities(prim, said) else names
 
 
-def _carried(prim: Usd.Prim, color: str) -> list[UsdGeom.Primvar]:
+def _moves_by_velocities(prim: Usd.Prim, said: Said) -> bool:
+    may = "velocities" in said.names and prim.IsA(UsdGeom.PointBased)
+    return may and is_carried_by_velocities(prim, Usd.TimeCode(0.0))
+
+
+def _carried(prim: Usd.Prim, color: str, shown: tuple[str, ...]) -> Iterator[UsdGeom.Primvar]:
     """The primvars that may be read of it, see primvars.read_carried."""
+    api = UsdGeom.PrimvarsAPI(prim)
+    yield from (api.GetPrimvar(name) for name in ("normals", "widths"))
+    yield from (api.FindPrimvarWithInheritance(name) for name in shown)
     found = find_primvars(prim).items()
-    return [p for name, p in found if name in (color, "displayOpacity") or may_be_uvs(p)]
+    yield from (p for name, p in found if name in (color, "displayOpacity") or may_be_uvs(p))
 
 
 def _read_shape(
-    prim: Usd.Prim, time: Usd.TimeCode, issues: list[str], color: str, as_cages: bool
+    prim: Usd.Prim, said: Said, time: Usd.TimeCode, issues: list[str], color: str, as_cages: bool
 ) -> tuple[Polygons | None, Copies | None]:
+    solid = read_solid(prim, said, time, issues, color, as_cage=as_cages)
+    if solid is not None:
+        return solid, None
     if prim.IsA(UsdGeom.Mesh):
-        return read_mesh(UsdGeom.Mesh(prim), time, issues, color), None
+        return read_mesh(UsdGeom.Mesh(prim), said, time, issues, color), None
     if prim.IsA(UsdGeom.Points):
         return read_points(UsdGeom.Points(prim), time, issues, color)
     if prim.IsA(UsdGeom.BasisCurves):
         return read_curves(UsdGeom.BasisCurves(prim), time, issues, color), None
     if prim.IsA(UsdGeom.NurbsPatch):
         return read_patch(UsdGeom.NurbsPatch(prim), time, issues, color), None
-    return read_solid(prim, time, issues, color, as_cage=as_cages), None
+    return None, None
+
+
+def _is_double_sided(prim: Usd.Prim, said: Said) -> bool:
+    """Planes are, unless they say otherwise."""
+    if "doubleSided" in said.names:
+        return bool(prim.GetAttribute("doubleSided").Get())
+    return _doubles_sides(prim.GetTypeName())
+
+
+@cache
+def _doubles_sides(type_name: str) -> bool:
+    """By the schema of a type."""
+    definition = Usd.SchemaRegistry().FindConcretePrimDefinition(type_name)
+    return bool(definition and definition.GetAttributeFallbackValue("doubleSided"))
 
 
 def _attributes(prim: Usd.Prim) -> tuple[str, ...]:

@@ -17,8 +17,9 @@ from pxr import Usd
 
 from defshade_cli.usd.cages import capsule_cage, cone_cage, frustum_cage, sphere_cage
 from defshade_cli.usd.polygons import Polygons
-from defshade_cli.usd.primvars import DISPLAY_COLOR, Elements, count_elements, read_carried
+from defshade_cli.usd.primvars import Elements, count_elements, read_carried
 from defshade_cli.usd.revolution import SEGMENTS, Strip, arc, disk, revolve, side
+from defshade_cli.usd.said import Said
 from defshade_cli.usd.values import floats
 
 _SPINE = {"X": 1, "Y": 2, "Z": 0}
@@ -104,21 +105,23 @@ def size_attributes(prim: Usd.Prim) -> tuple[str, ...]:
 
 
 def read_solid(
-    prim: Usd.Prim, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR, *, as_cage: bool = False
+    prim: Usd.Prim, said: Said, time: Usd.TimeCode, issues: list[str], color: str, *, as_cage: bool
 ) -> Polygons | None:
     """The gprim tessellated; None for any other type, no faces where a size is no size.
 
     as_cage: a curved solid is the cage that Hydra subdivides.
     """
-    if prim.GetTypeName() not in _GPRIMS:
+    build, names = _GPRIMS.get(prim.GetTypeName(), (None, ()))
+    if build is None:
         return None
-    build, names = _GPRIMS[prim.GetTypeName()]
     build = _CAGES.get(build, build) if as_cage else build
-    axis = _axis(prim, issues)
+    axis = _axis(prim, issues) if "axis" in said.names else "Z"
     if build is plane and axis != "Z":
         names = names[::-1]  # length comes first in cyclic order, by the schema's table of axes
     sizes = [_size(prim, name, time, issues) for name in names]
     polygons = _built(build, axis, tuple(sizes))
+    if not said.primvars:
+        return polygons
     return read_carried(prim, time, _elements(polygons), issues, color).laid_on(polygons)
 
 

@@ -33,6 +33,7 @@ class Standing(NamedTuple):
     draw_mode: of the models below; None below what is no model, where there are no others.
     rig: the outermost SkelRoot.
     proxied: the prototype that is walked and an instance of it, by whose proxies its prims are known on the stage.
+    primvars: some may be inherited.
     """
 
     root_from_prim: Gf.Matrix4d = IDENTITY
@@ -41,6 +42,7 @@ class Standing(NamedTuple):
     draw_mode: str | None = None
     rig: Rig | None = None
     proxied: tuple[Sdf.Path, Sdf.Path] | None = None
+    primvars: bool = False
 
     def on_stage(self, prim: Usd.Prim) -> Usd.Prim:
         """The prim, or the proxy of one in a prototype."""
@@ -56,7 +58,8 @@ class Standing(NamedTuple):
         """What an instance hands down into its prototype: nothing but its rig."""
         proxy = self.on_stage(instance)
         rig = Rig(proxy, IDENTITY, False) if self.rig else None
-        return Standing(rig=rig, proxied=(instance.GetPrototype().GetPath(), proxy.GetPath()))
+        proxied = instance.GetPrototype().GetPath(), proxy.GetPath()
+        return Standing(rig=rig, proxied=proxied, primvars=self.primvars)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import Enum, auto
+from typing import NamedTuple
 
 from pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdSkel
 
@@ -35,16 +36,24 @@ _KINDS = (
 """The first schema that a prim is of decides."""
 
 
+class Nature(NamedTuple):
+    """What follows from a prim's type alone."""
+
+    kind: Kind
+    is_imageable: bool
+    is_skel_root: bool
+
+
 class Kinds:
-    """Prims by kind; the answer is the same for all of a type, and kept."""
+    """Prims by type; the answer is the same for all of a type, and kept."""
 
     def __init__(self) -> None:
-        self._of_type: dict[str, Kind] = {}
+        self._of_type: dict[str, Nature] = {}
 
-    def of(self, prim: Usd.Prim) -> Kind:
+    def of(self, prim: Usd.Prim) -> Nature:
         type_name = prim.GetTypeName()
         if type_name not in self._of_type:
-            self._of_type[type_name] = _classify(prim)
+            self._of_type[type_name] = Nature(_classify(prim), prim.IsA(UsdGeom.Imageable), prim.IsA(UsdSkel.Root))
         return self._of_type[type_name]
 
 

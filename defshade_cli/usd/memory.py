@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 
 from pxr import Sdf, Usd, UsdGeom
@@ -14,6 +15,7 @@ from defshade_cli.usd.kind import Kinds
 from defshade_cli.usd.material import ReadMaterial, read_material
 from defshade_cli.usd.positions import is_carried_by_velocities
 from defshade_cli.usd.primvars import DISPLAY_COLOR
+from defshade_cli.usd.said import Said
 from defshade_cli.usd.shapes import Shapes
 from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.skel import Rigs
@@ -35,53 +37,63 @@ class Memory:
         self._shapes = Shapes()
         self._surfaces: dict[Sdf.Path, tuple[Usd.TimeCode, Surface | None]] = {}
         self._time_varying: dict[Sdf.Path, bool] = {}
-        self._bindings: dict[Sdf.Path, Bound] = {}
+        self._bindings: dict[str, Bound] = {"/": NOTHING_ABOVE}
         self._materials: dict[Sdf.Path, ReadMaterial] = {}
         self._first_instances: dict[str, str] = {}
         self._models = draw_mode.StandIns()
         self._stand_ins: dict[tuple[Sdf.Path, str], Surface] = {}
 
-    def surface_around(self, prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode) -> Surface | None:
+    def surface_around(self, prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode, said: Said) -> Surface | None:
         """The surface at a time near `base`, a frame. A mesh that velocities carry has what it has at the frame.
 
         So its points keep their number while the shutter is open, whatever samples lie within.
         """
         if time == base or not prim.IsA(UsdGeom.Mesh) or not is_carried_by_velocities(prim, time):
-            return self.surface(prim, time)
-        rest = self.surface(prim, base)
+            return self.surface(prim, time, said)
+        rest = self.surface(prim, base, said)
         return (move_surface(rest, prim, time, base) if rest and rest.groups else None) or rest
 
-    def surface(self, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
+    def surface(self, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Surface | None:
         """The same object at every time, unless something of the prim varies."""
         path = prim.GetPath()
         time_read, known = self._surfaces.get(path, (None, None))
-        if time_read is not None and (time == time_read or not self._is_time_varying(prim)):
+        if time_read is not None and (time == time_read or not self._is_time_varying(prim, said)):
             return known
-        surface = self._at_another_time(known, prim, time) if known else self._read_surface(prim, time)
+        surface = self._at_another_time(known, prim, time, said) if known else self._read_surface(prim, time, said)
         self._surfaces[path] = time, surface
         return surface
 
-    def _at_another_time(self, known: Surface, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
+    def _at_another_time(self, known: Surface, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Surface | None:
         """Read is no more than varies; what turns out to be equal stays the same object."""
-        shown = self._color_primvar(prim, time), self._extras.primvars
+        shown = self._color_primvar(prim, material_subsets(prim), time), self._extras.primvars
         moved = move_surface(known, prim, time) if known.groups and only_points_vary(prim, *shown) else None
-        return shared(moved or self._read_surface(prim, time), known)
+        return shared(moved or self._read_surface(prim, time, said), known)
 
-    def _read_surface(self, prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
-        color = self._color_primvar(prim, time)
-        surface = read_surface(prim, time, color, self._extras.primvars, self._shapes, as_cages=self._as_cages)
-        return None if surface is None else self._as_shown(surface, prim.GetPath())
+    def _read_surface(self, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Surface | None:
+        subsets = material_subsets(prim)
+        self._bound(str(prim.GetPath()), said.names)
+        surface = read_surface(
+            prim,
+            time,
+            self._color_primvar(prim, subsets, time),
+            self._extras.primvars,
+            self._shapes,
+            as_cages=self._as_cages,
+            said=said,
+            subsets=subsets,
+        )
+        return surface and self._as_shown(surface)
 
     def stand_in(self, prim: Usd.Prim, mode: str) -> Surface:
         """What is drawn of a model in a draw mode; it does not vary over time."""
         key = prim.GetPath(), mode
         if key not in self._stand_ins:
-            self._stand_ins[key] = self._as_shown(self._models.read(prim, mode), prim.GetPath())
+            self._stand_ins[key] = self._as_shown(self._models.read(prim, mode))
         return self._stand_ins[key]
 
-    def _color_primvar(self, prim: Usd.Prim, time: Usd.TimeCode) -> str:
+    def _color_primvar(self, prim: Usd.Prim, subsets: Iterable[UsdGeom.Subset], time: Usd.TimeCode) -> str:
         """What stands for displayColor: the primvar that a material bound to the prim reads its colour from."""
-        paths = (prim.GetPath(), *(subset.GetPath() for subset in material_subsets(prim)))
+        paths = (prim.GetPath(), *(subset.GetPath() for subset in subsets))
         bound = (material for path in paths for material in self.bindings(path).candidates)
         read = (self.material(path, time).material.color_primvar for path in bound)
         return next((name for name in read if name), DISPLAY_COLOR)
@@ -99,21 +111,23 @@ class Memory:
 
     def bindings(self, path: Sdf.Path | str) -> Bindings:
         """Relationships do not vary over time."""
-        return self._bound(self._stage.GetPrimAtPath(path)).bindings
+        return self._bound(str(path)).bindings
 
-    def _bound(self, prim: Usd.Prim) -> Bound:
-        """From the nearest prim above whose bindings are known, downwards."""
+    def _bound(self, path: str, said: Collection[str] | None = None) -> Bound:
+        """From the nearest prim above whose bindings are known, downwards. said: of the prim, where it is known."""
         unknown = []
-        while prim and (path := prim.GetPath()) not in self._bindings:
-            unknown.append((path, prim))
-            prim = prim.GetParent()
-        bound = self._bindings[prim.GetPath()] if prim else NOTHING_ABOVE
-        for path, below in reversed(unknown):
-            self._bindings[path] = bound = read_bound(below, bound)
+        while path not in self._bindings:
+            unknown.append(path)
+            path = path.rpartition("/")[0] or "/"
+        bound = self._bindings[path]
+        for below in reversed(unknown):
+            self._bindings[below] = bound = read_bound(self._stage, below, bound, said if below == unknown[0] else None)
         return bound
 
     def shown(self, path: Sdf.Path | str) -> str:
         """The path by which users know a prim: for one inside a native prototype, its path in the first instance."""
+        if not self._first_instances:
+            return str(path)
         root, slash, below = str(path)[1:].partition("/")
         return self._first_instances.get(root, f"/{root}") + slash + below
 
@@ -121,16 +135,16 @@ class Memory:
         """Show what stands in `prototype` as part of `instance`, or of the instance that came first."""
         return self._first_instances.setdefault(prototype.GetName(), self.shown(instance.GetPath()))
 
-    def _is_time_varying(self, prim: Usd.Prim) -> bool:
+    def _is_time_varying(self, prim: Usd.Prim, said: Said) -> bool:
         """Asked only when a second frame is read."""
         path = prim.GetPath()
         if path not in self._time_varying:
-            color = self._color_primvar(prim, Usd.TimeCode.Default())
-            self._time_varying[path] = is_time_varying(prim, color, self._extras.primvars)
+            color = self._color_primvar(prim, material_subsets(prim), Usd.TimeCode.Default())
+            self._time_varying[path] = is_time_varying(prim, color, self._extras.primvars, said)
         return self._time_varying[path]
 
-    def _as_shown(self, surface: Surface, path: Sdf.Path) -> Surface:
-        shown = self.shown(path)
+    def _as_shown(self, surface: Surface) -> Surface:
+        shown = self.shown(surface.path)
         if shown == surface.path:
             return surface
         issues = tuple(replace(issue, path=shown) for issue in surface.issues)

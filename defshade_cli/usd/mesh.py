@@ -18,6 +18,7 @@ from defshade_cli.usd.primvars import (
     fit,
     read_carried,
 )
+from defshade_cli.usd.said import Said
 from defshade_cli.usd.values import integers
 
 MESH_ATTRIBUTES = ("points", "faceVertexCounts", "faceVertexIndices", "holeIndices", "normals")
@@ -27,25 +28,28 @@ _POINTS = Sdf.ValueTypeNames.Point3fArray.type
 _NONE = np.empty(0, np.int32)
 
 
-def read_mesh(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR) -> Polygons:
+def read_mesh(
+    mesh: UsdGeom.Mesh, said: Said, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR
+) -> Polygons:
     """The mesh as authored, before refinement: faces that cannot be drawn are left out, holes stay."""
-    said = set(mesh.GetPrim().GetAuthoredPropertyNames())
+    names = said.names
     points = _points(mesh, time, issues)
     counts, indices = _topology(mesh, time, issues) if len(points) else (_NONE, _NONE)
     elements = count_elements(len(counts), len(points), len(indices))
-    scheme = _scheme(mesh, issues) if "subdivisionScheme" in said else "catmullClark"
-    has_normals = scheme == "none" and not said.isdisjoint(("normals", "primvars:normals"))
+    scheme = _scheme(mesh, issues) if "subdivisionScheme" in names else "catmullClark"
+    has_normals = scheme == "none" and ("normals" in names or "primvars:normals" in names)
     polygons = Polygons(
         points=points,
         counts=counts,
         indices=indices,
         faces=np.arange(len(counts), dtype=np.int32),
-        holes=_holes(mesh, time, len(counts), issues) if "holeIndices" in said else _NONE,
+        holes=_holes(mesh, time, len(counts), issues) if "holeIndices" in names else _NONE,
         scheme=scheme,
-        left_handed="orientation" in said and mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded,
+        left_handed="orientation" in names and mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded,
         normals=_normals(mesh, time, elements, issues) if has_normals else None,
     )
-    polygons = read_carried(mesh.GetPrim(), time, elements, issues, color).laid_on(polygons)
+    if said.primvars:
+        polygons = read_carried(mesh.GetPrim(), time, elements, issues, color).laid_on(polygons)
     return mend_normals(_without_broken_faces(polygons, issues), issues)
 
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
-from scipy.interpolate import BSpline
 
 from defshade_cli.usd.normals import mend_normals
 from defshade_cli.usd.polygons import Polygons, Primvar
@@ -43,6 +42,8 @@ class _Direction:
         """(M, ...) of a grid whose first axis is this direction's."""
         if derivative and self.degree == 0:
             return np.zeros((len(self.at), *grid.shape[1:]))
+        from scipy.interpolate import BSpline  # half a second to import, and few stages have patches
+
         spline = BSpline(self.knots, grid, self.degree)
         return (spline.derivative() if derivative else spline)(self.at)
 

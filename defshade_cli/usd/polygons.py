@@ -162,21 +162,15 @@ class Polygons:
     @cached_property
     def digest(self) -> bytes:
         """Equal for polygons that are equal in everything."""
-        found = blake2b(
-            repr((self.scheme, self.left_handed, tuple(self.uvs), tuple(self.shown))).encode(), digest_size=16
-        )
-        for array in (self.points, self.counts, self.indices, self.faces, self.holes):
-            _add(found, array)
-        for primvar in (
-            self.normals,
-            self.display_color,
-            self.display_opacity,
-            *self.uvs.values(),
-            *self.shown.values(),
-        ):
-            found.update(b"none" if primvar is None else primvar.interpolation.encode())
-            if primvar is not None:
-                _add(found, primvar.values)
+        named = (self.normals, self.display_color, self.display_opacity, *self.uvs.values(), *self.shown.values())
+        kinds = [primvar and primvar.interpolation for primvar in named]
+        values = (primvar.values for primvar in named if primvar)
+        arrays = (self.points, self.counts, self.indices, self.faces, self.holes, *values)
+        layout = [(array.dtype.str, array.shape) for array in arrays]
+        said = repr((self.scheme, self.left_handed, tuple(self.uvs), tuple(self.shown), kinds, layout))
+        found = blake2b(said.encode(), digest_size=16)
+        for array in arrays:
+            found.update(np.ascontiguousarray(array).data)
         return found.digest()
 
     def without_holes(self) -> Polygons:
@@ -223,9 +217,3 @@ class Polygons:
 
 def _unless_constant(primvar: Primvar | None) -> Primvar | None:
     return None if primvar is not None and primvar.interpolation == "constant" else primvar
-
-
-def _add(found: blake2b, array: NDArray) -> None:
-    """The size too, so that what ends one array does not begin the next."""
-    found.update(f"{array.dtype.str}{array.shape}".encode())
-    found.update(np.ascontiguousarray(array).data)

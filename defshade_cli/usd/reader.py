@@ -16,14 +16,17 @@ from pxr import Usd
 from defshade_cli.errors import EmptyStage
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
+from defshade_cli.scene.framing import Framing
 from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.motion import Moment, moment_of
 from defshade_cli.scene.scene import Scene, Unsupported
+from defshade_cli.scene.studio import studio_lights
 from defshade_cli.settings import Complexity
+from defshade_cli.spaces import Window, conform_window
 from defshade_cli.usd import stage as facts
-from defshade_cli.usd.camera import choose_camera, find_cameras, framed_camera, read_camera
+from defshade_cli.usd.camera import choose_camera, default_window, find_cameras, framed_camera, read_camera
 from defshade_cli.usd.complexity import View, choose_levels
 from defshade_cli.usd.copies import rounded
 from defshade_cli.usd.extent import extent_of
@@ -56,6 +59,7 @@ class StageReader:
     render_settings, product: paths of their prims; settings are found as usd/products.py does.
     complexity: of subdivision surfaces and, where it is not `auto`, of solids as Hydra makes cages of them; for `auto`
         it matters how large the image is, see scene.camera.image_size.
+    framing: a camera of ours in place of the stage's.  studio: lights of ours where the stage has none.
     extras: what only some layers need.
     beside: a reader of the same stage, whose memory is shared.
     Raises PrimNotFound for a camera or render settings that the stage lacks.
@@ -72,11 +76,13 @@ class StageReader:
         complexity: Complexity = "auto",
         size: tuple[int, int] | None = None,
         width: int | None = None,
+        framing: Framing | None = None,
+        studio: bool = False,
         extras: Extras = NO_EXTRAS,
         beside: StageReader | None = None,
     ) -> None:
         self._complexity, self._size, self._width = complexity, size, width
-        self._extras = extras
+        self._extras, self._framing, self._studio = extras, framing, studio
         as_cages = complexity != "auto"
         self._memory: Memory = beside._memory if beside else Memory(stage, extras, as_cages=as_cages)
         self._tessellation: Tessellation = beside._tessellation if beside else Tessellation()
@@ -88,11 +94,13 @@ class StageReader:
         self._cameras = find_cameras(stage)
         unresolved = (arc.unsupported for arc in find_unresolved(stage))
         self._issues = (*unresolved, *pass_issues(stage, render_settings))
-        self._camera = choose_camera(stage, self._cameras, camera, self._settings.camera)
+        self._camera = None if framing else choose_camera(stage, self._cameras, camera, self._settings.camera)
 
     @property
     def camera_name(self) -> str:
-        """The prim name of the camera that renders; `framed` for ours."""
+        """The prim name of the camera that renders; `framed`, `fit` or `turntable` for ours."""
+        if self._framing:
+            return self._framing.name
         return self._camera.GetName() if self._camera else "framed"
 
     def first_frame(self) -> float | None:
@@ -112,7 +120,7 @@ class StageReader:
             if self._extras.motion and frame is not None:
                 neighbours = tuple(self._moment(scene, frame + step, levels) for step in (-1.0, 1.0))
                 scene = replace(scene, neighbours=neighbours)
-        return _lit(scene)
+        return self._lit(scene)
 
     def read_shutter(self, scene: Scene, count: int) -> Iterator[Scene]:
         """The frame of `scene` again and again, at `count` times of its shutter in turn, without end.
@@ -123,7 +131,7 @@ class StageReader:
         for offset in cycle(scene.camera.shutter_times(count)):
             time = Usd.TimeCode(scene.frame + offset)
             with facts.silence():
-                yield _lit(self._read(scene.frame, time, self._levels))
+                yield self._lit(self._read(scene.frame, time, self._levels))
 
     def _moment(self, scene: Scene, frame: float, levels: dict[str, int]) -> Moment:
         """What `scene` has, as it is at another frame, refined alike."""
@@ -139,7 +147,7 @@ class StageReader:
         drawn = tuple((piece, surface) for piece, surface in placed if surface.groups)
         if not drawn and not traversal.dormant:
             raise EmptyStage(_empty(self._stage, traversal.issues))
-        camera, camera_issues = self._read_camera(time, placed)
+        camera, camera_issues = self._read_camera(frame, time, placed)
         gprims = self._tessellate(drawn, camera, levels)
         palette = Palette(self._memory, time, self._settings.material_purposes)
         meshes: dict[Mesh, int] = {}
@@ -184,20 +192,52 @@ class StageReader:
         return found
 
     def _read_camera(
-        self, time: Usd.TimeCode, placed: Iterable[PlacedSurface]
+        self, frame: float | None, time: Usd.TimeCode, placed: Sequence[PlacedSurface]
     ) -> tuple[Camera, tuple[Unsupported, ...]]:
-        """The camera; one of ours frames the surfaces as authored, however they are refined, empty ones too."""
+        if self._framing:
+            bounds = self._bounds_at_start if self._framing.turn else self._bounds(placed, time)
+            return self._framing.camera(bounds, facts.up_axis(self._stage), self._window, frame), ()
         if self._camera is None:
-            standing: dict[bytes, list[NDArray[np.float64]]] = defaultdict(list)
-            for piece, surface in placed:
-                standing[extent_of(self._stage, surface, time).tobytes()].append(piece.root_from_object)
-            boxes = (
-                world_boxes(np.frombuffer(extent).reshape(2, 3), _joined(matrices))
-                for extent, matrices in standing.items()
-            )
-            return framed_camera(enclose(boxes), facts.up_axis(self._stage)), ()
+            return framed_camera(self._bounds(placed, time), facts.up_axis(self._stage)), ()
         camera, issues = read_camera(self._camera, time)
         return self._settings.applied_to(camera), issues
+
+    @property
+    def _window(self) -> Window:
+        """Of a camera of ours whose image has the shape that is asked for."""
+        window = default_window()
+        aspect = (window[1] - window[0]) / (window[3] - window[2])
+        width, height = image_size(aspect, self._size, self._width, self._settings.resolution)
+        return conform_window(window, width / height)
+
+    @cached_property
+    def _bounds_at_start(self) -> NDArray[np.float64]:
+        """(2, 3) at the stage's first frame: a turn shall not sway with what moves."""
+        start = self.first_frame()
+        time = Usd.TimeCode.Default() if start is None else Usd.TimeCode(start)
+        pieces = Traversal(self._stage, self._memory, time, self._purposes, time, self._pass).read_stage()
+        return self._bounds(tuple(_surfaces(pieces, self._purposes)), time)
+
+    def _bounds(self, placed: Sequence[PlacedSurface], time: Usd.TimeCode) -> NDArray[np.float64]:
+        """(2, 3) around the surfaces as authored, however they are refined, empty ones too."""
+        boxes = [
+            np.broadcast_to(extent_of(self._stage, surface, time), (len(piece.root_from_object), 2, 3))
+            for piece, surface in placed
+        ]
+        matrices = np.concatenate([np.empty((0, 4, 4)), *(piece.root_from_object for piece, _ in placed)])
+        return enclose([world_boxes(np.concatenate([np.empty((0, 2, 3)), *boxes]), matrices)])
+
+    def _lit(self, scene: Scene) -> Scene:
+        """The scene with lights of ours where it has none: the studio, or one at the camera as usdrecord has it."""
+        if scene.lights:
+            if self._studio:
+                log.info("the stage has lights of its own: no studio is added")
+            return scene
+        log.info(
+            "no light that is supported: %s", "the studio lights it" if self._studio else "one shines from the camera"
+        )
+        lights = studio_lights(scene) if self._studio else (camera_light(scene.camera),)
+        return replace(scene, lights=lights, lit_by="studio" if self._studio else "camera light")
 
     def _tessellate(
         self, drawn: Iterable[PlacedSurface], camera: Camera, levels: dict[str, int]
@@ -207,10 +247,9 @@ class StageReader:
         view = View(camera.conformed(aspect, self._settings.conform), height)
         placed = ((surface, piece.root_from_object) for piece, surface in drawn)
         chosen = choose_levels(placed, self._complexity, view)
-        return {
-            surface: self._tessellation.at_level(surface, levels.setdefault(surface.path, level))
-            for surface, level in chosen.items()
-        }
+        return self._tessellation.at_levels(
+            {surface: levels.setdefault(surface.path, level) for surface, level in chosen.items()}
+        )
 
 
 def _surfaces(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[PlacedSurface]:
@@ -257,7 +296,7 @@ def _drawable(mesh: int, subsets: tuple[Subset, ...], pieces: Sequence[Piece], u
         paths=tuple(path for piece in pieces for path in piece.paths),
         instance_ids=_joined([piece.ids for piece in pieces]),
         display_color=np.where(np.isnan(color), unauthored.diffuse_color, color),
-        display_opacity=np.nan_to_num(opacity, nan=unauthored.opacity),
+        display_opacity=np.where(np.isnan(opacity), unauthored.opacity, opacity),
     )
 
 
@@ -299,14 +338,6 @@ def _lights(pieces: Iterable[Piece]) -> Iterator[Light]:
             for path, world_from_object in zip(paths, piece.root_from_object, strict=True):
                 world_from_light = world_from_object @ piece.content.world_from_light
                 yield replace(piece.content, path=path, world_from_light=world_from_light)
-
-
-def _lit(scene: Scene) -> Scene:
-    """The scene with a light at the camera, as usdrecord has it, where there is no other."""
-    if scene.lights:
-        return scene
-    log.info("no light that is supported: one shines from the camera")
-    return replace(scene, lights=(camera_light(scene.camera),))
 
 
 def _empty(stage: Usd.Stage, issues: Iterable[Unsupported]) -> str:

@@ -57,13 +57,16 @@ class Faces:
 
 def material_subsets(prim: Usd.Prim) -> list[UsdGeom.Subset]:
     """The subsets of the prim's faces in the family materialBind."""
+    if not prim.GetAllChildrenNames():
+        return []
     subsets = UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets()
     return [s for s in subsets if s.GetElementTypeAttr().Get() == UsdGeom.Tokens.face]
 
 
-def read_faces(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> Faces:
+def read_faces(
+    prim: Usd.Prim, path: str, subsets: list[UsdGeom.Subset], time: Usd.TimeCode, issues: list[str]
+) -> Faces:
     """Which subset holds each face, the gprim itself those that none does."""
-    subsets, path = material_subsets(prim), str(prim.GetPath())
     if not subsets:
         return Faces((path,))
     group = _group_of_face(subsets, UsdGeom.Mesh(prim).GetFaceCount(time), time, issues)

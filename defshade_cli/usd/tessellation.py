@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 from weakref import WeakKeyDictionary, ref
@@ -10,6 +11,7 @@ from defshade_cli.usd.control import Control
 from defshade_cli.usd.geometry import FaceGroup, Gprim, Surface, tessellate
 from defshade_cli.usd.polygons import Polygons
 from defshade_cli.usd.refiner import Refiner
+from defshade_cli.usd.small_meshes import Shaped, shape_all
 
 
 class Tessellation:
@@ -24,31 +26,43 @@ class Tessellation:
         self._of_shape: WeakKeyDictionary[Polygons, list[_Alike]] = WeakKeyDictionary()
         self._refiners: dict[str, Refiner] = {}
 
-    def at_level(self, surface: Surface, level: int) -> Gprim:
-        """Level 0 is the cage; what is no subdivision surface has no other."""
+    def at_levels(self, levels: Mapping[Surface, int]) -> dict[Surface, Gprim]:
+        """Of surfaces that have none yet, small ones are shaped together."""
+        unknown = (
+            surface.polygons
+            for surface, level in levels.items()
+            if level == 0 and surface.path not in self._gprims and surface.polygons not in self._of_shape
+        )
+        shaped = shape_all(unknown)
+        return {
+            surface: self.at_level(surface, level, shaped.get(surface.polygons)) for surface, level in levels.items()
+        }
+
+    def at_level(self, surface: Surface, level: int, shaped: Shaped | None = None) -> Gprim:
+        """Level 0 is the cage; what is no subdivision surface has no other. shaped: see tessellate, of level 0."""
         known, at, gprim = self._gprims.get(surface.path, (None, 0, None))
         if gprim is None or known is not surface or at != level:
             last = gprim if at == level else None
             cut = self._shared if surface.faces.group is None else self._cut
-            gprim = cut(surface, level, last)
+            gprim = cut(surface, level, last, shaped if level == 0 else None)
             self._gprims[surface.path] = surface, level, gprim
         return gprim
 
-    def _shared(self, surface: Surface, level: int, last: Gprim | None) -> Gprim:
+    def _shared(self, surface: Surface, level: int, last: Gprim | None, shaped: Shaped | None) -> Gprim:
         """The triangles of all surfaces with this shape that are in use."""
         alike = [one for one in self._of_shape.get(surface.polygons, ()) if one.gprim() is not None]
         for one in alike:
             gprim = one.gprim()
             if gprim is not None and one.serves(surface, level):
                 return _renamed(gprim, surface)
-        gprim = self._cut(surface, level, last)
+        gprim = self._cut(surface, level, last, shaped)
         alike.append(_Alike(surface.control, surface.double_sided, level, ref(gprim)))
         self._of_shape[surface.polygons] = alike
         return gprim
 
-    def _cut(self, surface: Surface, level: int, last: Gprim | None) -> Gprim:
+    def _cut(self, surface: Surface, level: int, last: Gprim | None, shaped: Shaped | None) -> Gprim:
         refiner = self._refiner(surface.path, surface.control, level) if surface.control and level else None
-        return tessellate(surface, refiner, last)
+        return tessellate(surface, refiner, last, shaped)
 
     def _refiner(self, path: str, control: Control, level: int) -> Refiner:
         known = self._refiners.get(path)

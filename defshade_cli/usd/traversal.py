@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdSkel
+from pxr import Sdf, Usd, UsdGeom, UsdLux
 
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.scene import Unsupported
@@ -18,15 +18,19 @@ from defshade_cli.usd.copies import Copies, once
 from defshade_cli.usd.draw_mode import FULL, handed_down, mode_above, takes_effect
 from defshade_cli.usd.geometry import Surface, is_time_varying
 from defshade_cli.usd.instancing import Piece, Standing, finite, place
-from defshade_cli.usd.kind import Kind
+from defshade_cli.usd.kind import Kind, Nature
 from defshade_cli.usd.light import is_light, read_light
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.mesh_light import Glow
 from defshade_cli.usd.native_instances import NativeInstances
 from defshade_cli.usd.point_instancer import has_varying_copies, read_point_instancer
 from defshade_cli.usd.render_pass import PassRules
+from defshade_cli.usd.said import Said, said_of
 from defshade_cli.usd.skel import Rig
 from defshade_cli.usd.xform import gf_matrix, matrix
+
+_VISIBILITY, _PURPOSE = str(UsdGeom.Tokens.visibility), str(UsdGeom.Tokens.purpose)
+_XFORM_OPS = str(UsdGeom.Tokens.xformOpOrder)
 
 _PROTOTYPE_CHILDREN = Usd.PrimIsActive & Usd.PrimIsLoaded
 """Classes and overs count below a PointInstancer's prototype: the schema recommends them to hide it elsewhere."""
@@ -73,13 +77,18 @@ class Traversal:
         stack = [(root, above) for root in reversed(list(roots))]
         while stack:
             prim, above = stack.pop()
-            kind, here = self._memory.kinds.of(prim), self._stand(prim, above)
-            if kind is Kind.SHADING or here is None or self._is_pruned(prim):
+            nature = self._memory.kinds.of(prim)
+            kind = nature.kind
+            if kind is Kind.SHADING or self._is_pruned(prim):
+                continue
+            said = said_of(prim, primvars_above=above.primvars)
+            here = self._stand(prim, above, nature, said)
+            if here is None:
                 continue
             if here.draw_mode not in (None, FULL) and takes_effect(prim):
                 pieces.append(self._stand_in(prim, here))
                 continue
-            pieces.extend(self._own_pieces(prim, kind, here))
+            pieces.extend(self._own_pieces(prim, kind, here, said))
             if self._is_hidden(prim) and (kind is Kind.POINT_INSTANCER or prim.IsInstance()):
                 continue
             if kind is Kind.POINT_INSTANCER:
@@ -92,24 +101,22 @@ class Traversal:
         pieces.extend(self._native_instances(instances))
         return tuple(pieces)
 
-    def _stand(self, prim: Usd.Prim, above: Standing) -> Standing | None:
+    def _stand(self, prim: Usd.Prim, above: Standing, nature: Nature, said: Said) -> Standing | None:
         """What `prim` hands down, None where it is invisible; of other than Imageables only the draw mode counts."""
         mode = handed_down(prim, above.draw_mode) if above.draw_mode else None
-        if not prim.IsA(UsdGeom.Imageable):
-            return above if mode == above.draw_mode else above._replace(draw_mode=mode)
-        said = prim.GetAuthoredPropertyNames()
-        if UsdGeom.Tokens.visibility in said and not self._is_visible(prim):
+        if not nature.is_imageable:
+            return above._replace(draw_mode=mode, primvars=said.primvars)
+        if _VISIBILITY in said.names and not self._is_visible(prim):
             return None
-        local, resets = self._memory.xforms.GetLocalTransformation(prim)
-        root_from_prim = local if resets else local * above.root_from_prim
-        own = above.purpose
-        if UsdGeom.Tokens.purpose in said:
-            purpose = prim.GetAttribute(UsdGeom.Tokens.purpose)
-            own = str(purpose.Get()) if purpose.HasAuthoredValue() else own
-        here = above._replace(
-            root_from_prim=root_from_prim, in_world=resets or above.in_world, purpose=own, draw_mode=mode
-        )
-        return here.with_rig(prim) if prim.IsA(UsdSkel.Root) else here
+        root_from_prim, in_world, purpose, _, rig, proxied, _ = above
+        if _XFORM_OPS in said.names:
+            local, resets = self._memory.xforms.GetLocalTransformation(prim)
+            root_from_prim, in_world = (local, True) if resets else (local * root_from_prim, in_world)
+        if _PURPOSE in said.names:
+            authored = prim.GetAttribute(_PURPOSE)
+            purpose = str(authored.Get()) if authored.HasAuthoredValue() else purpose
+        here = Standing(root_from_prim, in_world, purpose, mode, rig, proxied, said.primvars)
+        return here.with_rig(prim) if nature.is_skel_root else here
 
     def _is_hidden(self, prim: Usd.Prim) -> bool:
         """Itself, by the pass; what stands below it may be shown."""
@@ -119,20 +126,20 @@ class Traversal:
         return self._rules is not None and self._rules.prunes(prim.GetPath())
 
     def _is_visible(self, prim: Usd.Prim) -> bool:
-        visibility = prim.GetAttribute(UsdGeom.Tokens.visibility)
+        visibility = prim.GetAttribute(_VISIBILITY)
         if visibility.Get(self._time) != UsdGeom.Tokens.invisible:
             return True
         self.dormant |= visibility.ValueMightBeTimeVarying()
         return False
 
-    def _own_pieces(self, prim: Usd.Prim, kind: Kind, here: Standing) -> Iterator[Piece]:
+    def _own_pieces(self, prim: Usd.Prim, kind: Kind, here: Standing, said: Said) -> Iterator[Piece]:
         """What the prim itself is, whatever stands below it."""
         if self._is_hidden(prim):
             return
         if is_light(prim):
             yield from self._light(prim, here)
         if kind is Kind.GPRIM and here.purpose in (None, *self._purposes):
-            yield from self._gprim(prim, here)
+            yield from self._gprim(prim, here, said)
         elif kind is Kind.UNDRAWN:
             self._report(prim, f"prims of type {prim.GetTypeName()} are not drawn")
         elif kind is Kind.UNKNOWN:
@@ -157,14 +164,15 @@ class Traversal:
         elif light is not None:
             yield self._piece(prim, here, light)
 
-    def _gprim(self, prim: Usd.Prim, here: Standing) -> Iterator[Piece]:
-        surface = self._memory.surface_around(prim, self._time, self._base)
+    def _gprim(self, prim: Usd.Prim, here: Standing, said: Said) -> Iterator[Piece]:
+        surface = self._memory.surface_around(prim, self._time, self._base, said)
         if surface is None:
             self._report(prim, f"prims of type {prim.GetTypeName()} are not drawn")
             return
         if surface.groups and here.rig:
             surface, here = self._deformed(prim, surface, here, here.rig)
-        self.issues.update(dict.fromkeys(surface.issues))
+        if surface.issues:
+            self.issues.update(dict.fromkeys(surface.issues))
         self.dormant |= not surface.groups and is_time_varying(prim)
         yield self._piece(prim, here, surface, {path: self._memory.bindings(path) for path in surface.groups})
 
@@ -185,10 +193,11 @@ class Traversal:
         self, prim: Usd.Prim, here: Standing, content: Surface | Light, bindings: Mapping[str, Bindings] | None = None
     ) -> Piece:
         copies = _copies_of(content)
+        placed = matrix(here.root_from_prim)
         return Piece(
             content,
-            matrix(here.root_from_prim) @ copies.object_from_copy,
-            (self._memory.shown(prim.GetPath()),),
+            placed @ copies.object_from_copy,
+            (content.path if isinstance(content, Surface) else self._memory.shown(prim.GetPath()),),
             copies.ids,
             copies.display_color,
             copies.display_opacity,
@@ -232,7 +241,7 @@ class Traversal:
             self._prototypes[key] = None
             above = UsdGeom.Imageable(root.GetParent()).ComputePurposeInfo()
             purpose = str(above.purpose) if above.isInheritable else None
-            standing = Standing(purpose=purpose, draw_mode=mode_above(root), proxied=here.proxied)
+            standing = Standing(purpose=purpose, draw_mode=mode_above(root), proxied=here.proxied, primvars=True)
             self._prototypes[key] = self._read([root], standing, _PROTOTYPE_CHILDREN)
         pieces = self._prototypes[key]
         if pieces is None:

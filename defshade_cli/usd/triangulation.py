@@ -14,6 +14,9 @@ from defshade_cli.usd.ears import clip_ears
 from defshade_cli.usd.normals import vector_areas
 from defshade_cli.usd.polygons import Polygons
 
+Triangles = tuple[NDArray[np.intp], NDArray[np.int32]]
+"""Triangles as corners (T, 3), and the face of each (T,)."""
+
 LARGEST_CLIPPED = 1 << 14
 """Corners up to which a face that is not convex is cut right: clipping may take the square of their number."""
 
@@ -21,8 +24,8 @@ _CUT_02 = np.array([[0, 1, 2], [0, 2, 3]])
 _CUT_13 = np.array([[0, 1, 3], [1, 2, 3]])
 
 
-def triangulate(polygons: Polygons, issues: list[str]) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
-    """Triangles as corners (T, 3), and the face of each (T,), in the order of the faces.
+def triangulate(polygons: Polygons, issues: list[str]) -> Triangles:
+    """In the order of the faces.
 
     A face of n corners gives n − 2 triangles, wound as it is.
     """

@@ -13,7 +13,18 @@ uvec4 pcg4d(uvec4 v) {
     return v;
 }
 
-// In [0, 1), 24 bits.
-float unit_hash(uvec4 seed) {
-    return float(pcg4d(seed).x >> 8u) * (1.0 / 16777216.0);
+uint laine_karras(uint x, uint key) {
+    x += key;
+    x ^= x * 0x6c50b47cu;
+    x ^= x * 0xb82f1e52u;
+    x ^= x * 0xc7afe638u;
+    return x ^ x * 0x8d22f6e6u;
+}
+
+// Number `index` of the seed's own sequence in [0, 1), 24 bits, stratified at every power of two: Burley 2020,
+// "Practical Hash-based Owen Scrambling", JCGT 9(4). Sequences of different seeds know nothing of each other.
+float owen_van_der_corput(uint index, uvec4 seed) {
+    uvec4 keys = pcg4d(seed);
+    uint shuffled = bitfieldReverse(laine_karras(bitfieldReverse(index), keys.x));
+    return float(bitfieldReverse(laine_karras(shuffled, keys.y)) >> 8u) * (1.0 / 16777216.0);
 }

@@ -7,6 +7,7 @@ const uint PROFILE_UNIFORM = 0u;
 const uint PROFILE_COSINE = 1u;
 const uint PROFILE_SINE = 2u;
 
+#ifdef SHAPED
 // UsdLuxShapingAPI: cone with softness, focus with tint; `cosine` is between the axis and the direction of emission.
 vec3 shaping(Light light, float cosine, float sine) {
     float angle = atan(sine, cosine);
@@ -16,6 +17,7 @@ vec3 shaping(Light light, float cosine, float sine) {
     float focus = light.focus > 0.0 ? pow(abs(cosine), light.focus) : 1.0;
     return cone * mix(light.focus_tint, vec3(1.0), focus);
 }
+#endif
 
 #ifdef IES
 uniform sampler2DArray ies_tables; // candela by horizontal and vertical angle, a layer a profile
@@ -35,8 +37,10 @@ float ies(Light light, vec3 l, float angle) {
 
 // Emission of the light's shape, or of a point on it, over its greatest.
 float profile(Light light, vec3 emission_direction) {
+#ifdef PROFILES
     if (light.profile == PROFILE_COSINE) return max(dot(light.facing, emission_direction), 0.0);
     if (light.profile == PROFILE_SINE) return length(cross(light.facing, emission_direction));
+#endif
     return 1.0;
 }
 
@@ -64,9 +68,13 @@ vec3 irradiance_from(Light light, vec3 position, out vec3 l) {
     float distance_squared = dot(to_light, to_light);
     l = to_light * inversesqrt(distance_squared);
     if (distance_squared >= light.reach * light.reach) return vec3(0.0);
+    vec3 emitted = light.intensity;
+#ifdef SHAPED
     float cosine = dot(-l, light.axis);
     float sine = length(cross(l, light.axis));
-    vec3 emitted = light.intensity * shaping(light, cosine, sine) * (profile(light, -l) / distance_squared);
+    emitted *= shaping(light, cosine, sine);
+#endif
+    emitted *= profile(light, -l) / distance_squared;
 #ifdef IES
     emitted *= ies(light, l, atan(sine, cosine));
 #endif

@@ -40,6 +40,7 @@ struct Material {
     uint use_specular_workflow;
     uint uses_display_color;
     uint uses_display_opacity;
+    uint is_transparent;       // opacity scales the diffuse alone
     uint one_sided;
     uint first_input;          // of its textures
     uint input_count;

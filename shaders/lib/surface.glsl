@@ -14,6 +14,10 @@ struct Surface {
 #ifdef PLANE_LINKS
     uint link_set;
 #endif
+#ifdef PLANE_WEIGHTS
+    vec2 weights;              // of the diffuse, and of lobes and emission: what a sample that was kept stands for
+    float turn;                // of the normal over a pixel, squared
+#endif
 };
 
 // Reflectance at normal incidence of a dielectric in air.
@@ -33,6 +37,18 @@ void set_metallic_fresnel(inout Surface s, float dielectric_f0) {
 // 1 for lobes too narrow for a sample's few directions of a sky to find, 0 for wide ones.
 float sharpness(float roughness) {
     return 1.0 - smoothstep(0.25, 0.45, roughness);
+}
+
+// The part of the light along a direction that the lobes leave to what lies below them, at most.
+float left_by_lobes(Surface s, float NoV) {
+    vec3 E = E_bound(s.f0, s.f90, NoV, GGX_alpha(s.roughness), SMITH_GGX);
+    float coat = E_bound(vec3(DEFAULT_F0), vec3(1.0), NoV, GGX_alpha(s.clearcoat_roughness), SMITH_GGX).x;
+    return clamp(1.0 - max(E.r, max(E.g, E.b)), 0.0, 1.0) * (1.0 - s.clearcoat * coat);
+}
+
+// Of a normal over a pixel, squared, by its change to the right and to the top.
+float turn_of(vec3 across, vec3 along) {
+    return dot(across, across) + dot(along, along);
 }
 
 struct Angles {

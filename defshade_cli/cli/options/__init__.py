@@ -77,6 +77,8 @@ def make_job(values: dict[str, Any]) -> RenderJob:
         raise UsageError("--size and --width exclude each other")
     if values["frames"] and values["default_time"]:
         raise UsageError("--frames and --default-time exclude each other")
+    _check_camera(values)
+    _check_output(values)
     values["mask"] = values["mask"] or ()
     given = values.pop("given", frozenset()) | _typed()
     default_time = values.pop("default_time")
@@ -89,6 +91,25 @@ def make_job(values: dict[str, Any]) -> RenderJob:
         given=given,
         **take(values, RenderJob),
     )
+
+
+def _check_output(values: dict[str, Any]) -> None:
+    """Not all commands have output."""
+    if values.get("sheet") and values["split_layers"]:
+        raise UsageError("--sheet and --split-layers exclude each other")
+    patterns = values.get("patterns")
+    if values.get("sheet") and patterns and all(pattern.lower().endswith(".exr") for pattern in patterns):
+        raise UsageError("--sheet is a picture: give -o a name such as sheet.png")
+
+
+def _check_camera(values: dict[str, Any]) -> None:
+    ours = next((name for name in ("turntable", "fit") if values[name]), None)
+    if ours and values["camera"]:
+        raise UsageError(f"--camera and --{ours} exclude each other")
+    if values["turntable"] and values["default_time"]:
+        raise UsageError("--turntable and --default-time exclude each other")
+    if values["direction"] and not ours:
+        raise UsageError("--direction is for --fit and --turntable")
 
 
 def _typed() -> frozenset[str]:
@@ -107,7 +128,8 @@ def take(values: dict[str, Any], owner: Any) -> dict[str, Any]:
 
 def with_output(job: RenderJob, name: str, *, fixed: bool = False) -> RenderJob:
     """`job` with the default file name where the user gave none. fixed: whatever names the stage's products have."""
-    fallback = f"{name}.####.exr" if len(job.frames) > 1 else f"{name}.exr"
+    suffix = ".png" if job.output.sheet else ".exr"
+    fallback = f"{name}.####{suffix}" if len(job.frames) > 1 else f"{name}{suffix}"
     patterns = job.output.patterns or (fallback,) * fixed
     return replace(job, output=replace(job.output, patterns=patterns, fallback=fallback))
 

@@ -10,7 +10,7 @@ import click
 from defshade_cli import settings
 from defshade_cli.cli.options.option import Function, Option
 from defshade_cli.cli.options.sampling import sampling_options
-from defshade_cli.cli.types import Crop, Finite, Layers, Ranks, Size
+from defshade_cli.cli.types import Crop, Finite, Layers, Positive, Ranks, Size
 from defshade_cli.settings import RenderSettings
 
 _RENDER = RenderSettings()
@@ -99,6 +99,21 @@ def _shading_options() -> list[Function]:
             help="Refinement of subdivision surfaces: auto goes by their size in the image; low draws their cages, "
             "medium, high and veryhigh one, two and three levels. All but auto make solids of ten segments, as "
             "usdrecord does.",
+        ),
+        option(
+            "--light-tolerance",
+            type=Positive(),
+            metavar="VALUE",
+            default=_RENDER.light_tolerance,
+            default_text=f"{_RENDER.light_tolerance:g}",
+            help="Scene-linear light that a pixel may lose in all where lights are taken to end; more makes smaller "
+            "volumes and faster frames.",
+        ),
+        option(
+            "--debug",
+            type=click.Choice(settings.DEBUGS),
+            help="Draw over the beauty: volumes are the shapes around the lights' reach, each in a colour; what fills "
+            "the image is a frame.",
         ),
         option(
             "--render-space",

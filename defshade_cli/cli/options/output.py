@@ -48,6 +48,11 @@ def output_options(name: str) -> list[Function]:
             default_text=str(_OUTPUT.compression),
             help="Compression of EXR.",
         ),
+        option(
+            "--sheet",
+            is_flag=True,
+            help="One picture with all layers as labelled tiles, data in false colour with a legend.",
+        ),
         option("--split-layers", is_flag=True, help="One file a layer in place of one file with all."),
         option("--multipart", is_flag=True, help="One part a layer inside the EXR."),
         option("--tiled", is_flag=True, help="EXR in tiles in place of scanlines."),
@@ -60,6 +65,14 @@ def output_options(name: str) -> list[Function]:
         ),
         option("--dither", is_flag=True, help="Dither the colours of 8-bit pictures, so that gradients show no bands."),
         option("--verify", is_flag=True, help="Read each file back and compare, before it takes its name."),
+        option(
+            "--on-nan",
+            type=click.Choice(settings.ON_NAN),
+            default=_OUTPUT.on_nan,
+            default_text=str(_OUTPUT.on_nan),
+            help="Where a value is NaN or infinite: end with exit code 5 once the frame is written, warn, or fill in "
+            "the value of the nearest sound pixel. The log says which prim and light it comes from.",
+        ),
         option("--display", metavar="NAME", help="OCIO display for formats such as PNG, not for EXR."),
         option("--view", metavar="NAME", help="OCIO view of the display."),
         option("--look", metavar="NAME", help="OCIO look, before the view."),

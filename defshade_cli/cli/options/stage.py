@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from defshade_cli import settings
+from defshade_cli.cli.options.framing import framing_options
 from defshade_cli.cli.options.option import Function, Option
 from defshade_cli.cli.types import Frames, Names, PrimPaths, Variant
 from defshade_cli.settings import Composition
@@ -24,6 +25,7 @@ def stage_options() -> list[Function]:
             metavar="PATH|NAME",
             help="Camera to look through. The default is the stage's own choice, else a view of everything.",
         ),
+        *framing_options(),
         option(
             "--frames",
             type=Frames(),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from defshade_cli.errors import UsageError
 from defshade_cli.image.encoders.exr import write_exr
-from defshade_cli.image.encoders.pictures import PICTURES, write_picture
+from defshade_cli.image.encoders.pictures import PICTURES, write_picture, write_sheet
 from defshade_cli.image.film import Film
 from defshade_cli.settings import OutputSettings
 
@@ -33,9 +33,11 @@ def check_format(path: Path, output: OutputSettings) -> None:
 
 
 def encode(film: Film, names: tuple[str, ...], output: OutputSettings, path: Path) -> None:
-    """Write layers to `path`: all as EXR, the only one as a picture. Raises OSError with the reason."""
+    """Write layers to `path`: all as EXR or a sheet, the only one as a picture. Raises OSError with the reason."""
     if suffix_of(path) == EXR:
         write_exr(film, names, output, path)
+    elif output.sheet:
+        write_sheet(film, names, output, path)
     else:
         (name,) = names
         write_picture(film, name, output, path)

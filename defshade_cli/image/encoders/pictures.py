@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import OpenImageIO as oiio
 
-from defshade_cli.image.colour import display_transform, picture
+from defshade_cli.image.colour import Pixels, display_transform, picture
 from defshade_cli.image.encoders.sink import bounded, make_spec, opened, set_attributes
 from defshade_cli.image.film import Film
 from defshade_cli.image.metadata import text_attributes
+from defshade_cli.image.sheet import contact_sheet
 from defshade_cli.settings import OutputSettings
 
 Hint = tuple[str, str | int]
@@ -54,7 +56,7 @@ PICTURES = {
 
 def write_picture(film: Film, name: str, output: OutputSettings, path: Path) -> None:
     """Write the layer `name` as it looks. Raises OSError with the reason."""
-    form, layer = PICTURES[path.suffix.lower()], film.row(name)
+    form, layer = _format(path), film.row(name)
     pixels = bounded(name, film.layers[name], half=layer.is_color)
     transform = display_transform(output.display, output.view, output.look, film.render_space)
     shown = film.shown.get((name, form.alpha))
@@ -64,7 +66,24 @@ def write_picture(film: Film, name: str, output: OutputSettings, path: Path) -> 
     spec = make_spec(film, shown.shape[-1], f"uint{bits}")
     if layer.is_color:
         spec.set_colorspace(transform.encoding)
-    for hint, value in (*form.hints, *_hints(dithered=output.dither and layer.is_color and bits == 8)):
+    _write(shown, spec, film, path, dithered=output.dither and layer.is_color and bits == 8)
+
+
+def write_sheet(film: Film, names: tuple[str, ...], output: OutputSettings, path: Path) -> None:
+    """Write all the layers as tiles of one picture. Raises OSError with the reason."""
+    transform = display_transform(output.display, output.view, output.look, film.render_space)
+    sheet = contact_sheet(film, names, transform)
+    height, width = sheet.shape[:2]
+    _write(sheet, oiio.ImageSpec(width, height, 3, f"uint{output.bits or _format(path).bits[0]}"), film, path)
+
+
+def _format(path: Path) -> PictureFormat:
+    return PICTURES[path.suffix.lower()]
+
+
+def _write(shown: Pixels, spec: oiio.ImageSpec, film: Film, path: Path, *, dithered: bool = False) -> None:
+    form = _format(path)
+    for hint, value in (*form.hints, *_hints(dithered=dithered)):
         spec.attribute(hint, value)
     set_attributes(spec, text_attributes(film))
     if form.fails_badly:

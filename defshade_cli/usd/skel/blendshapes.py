@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import UsdSkel, Vt
-from scipy.sparse import coo_matrix, csr_matrix
 
 from defshade_cli.usd.values import floats, integers
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,6 +90,8 @@ def _normal_offsets(query: UsdSkel.BlendShapeQuery, sub_shape: int) -> object:
 
 def _stacked(entries: list[Entries], points: int) -> csr_matrix:
     """(3P, S) with one column a sub-shape."""
+    from scipy.sparse import coo_matrix, csr_matrix
+
     if not entries:
         return csr_matrix((3 * points, 0))
     rows = [(3 * places[:, None] + np.arange(3)).ravel() for places, _ in entries]

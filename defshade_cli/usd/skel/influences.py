@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdSkel
-from scipy.sparse import csr_matrix
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +38,8 @@ class Influences:
         return np.take_along_axis(self.joints, self.weights.argmax(axis=1)[:, None], axis=1)[:, 0]
 
     def with_weights(self, weights: NDArray[np.float64]) -> csr_matrix:
+        from scipy.sparse import csr_matrix
+
         count, most = self.joints.shape
         starts = np.arange(count + 1) * most
         return csr_matrix((weights.ravel(), self.joints.ravel(), starts), shape=(count, self.joint_count))

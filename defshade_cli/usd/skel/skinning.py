@@ -12,7 +12,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from defshade_cli.usd.skel.influences import Influences
 
@@ -82,6 +81,8 @@ class DualQuaternionBlend:
     @cached_property
     def _quaternions(self) -> NDArray[np.float64]:
         """(J, 8) real and dual part, each x y z w."""
+        from scipy.spatial.transform import Rotation
+
         real = Rotation.from_matrix(self._rotations).as_quat()
         x, w = real[:, :3], real[:, 3:]
         t = 0.5 * self.joints[:, :3, 3]

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import reduce
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
 
-Masks: TypeAlias = sparse.csr_array
+if TYPE_CHECKING:  # scipy is a quarter of a second to import, and not every stage is subdivided
+    from scipy import sparse
+
+Masks: TypeAlias = "sparse.csr_array"
 Entries: TypeAlias = tuple[NDArray, NDArray, ArrayLike]
 """(rows, columns, weights); a single weight stands for all."""
 
 
 def assemble(shape: tuple[int, int], *entries: Entries) -> Masks:
     """The matrix that sums all entries; those at one place add up, and zeros leave no trace."""
+    from scipy import sparse
+
     rows, columns, weights = zip(*map(_used, entries), strict=True)
     places = np.concatenate(rows, dtype=np.int32), np.concatenate(columns, dtype=np.int32)
     return sparse.csr_array((np.concatenate(weights), places), shape=shape)
@@ -30,6 +34,8 @@ def _used(entries: Entries) -> tuple[NDArray, NDArray, NDArray[np.float64]]:
 
 
 def identity(count: int) -> Masks:
+    from scipy import sparse
+
     return sparse.csr_array(sparse.identity(count, format="csr"))
 
 

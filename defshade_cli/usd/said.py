@@ -1,0 +1,21 @@
+"""What is authored on a prim, asked once: of many small prims, each question takes as long as a triangle's cut."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import NamedTuple
+
+from pxr import Usd
+
+
+class Said(NamedTuple):
+    """names: of the properties authored on a prim.  primvars: may any lie on it, its own or an ancestor's?"""
+
+    names: Collection[str]
+    primvars: bool
+
+
+def said_of(prim: Usd.Prim, *, primvars_above: bool = True) -> Said:
+    """primvars_above: may an ancestor have some?"""
+    names = prim.GetAuthoredPropertyNames()
+    return Said(names, primvars_above or any(name.startswith("primvars:") for name in names))
