@@ -5,12 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.image.film import Film
 from defshade_cli.image.reading import read
+from defshade_cli.measure.conformance.arnold import read_as_arnold
 from defshade_cli.measure.conformance.catalogue import Case
 from defshade_cli.measure.conformance.conditions import under
 from defshade_cli.measure.conformance.silhouette import (
@@ -23,7 +25,7 @@ from defshade_cli.measure.conformance.silhouette import (
     mask_of_color,
 )
 from defshade_cli.passes.pipeline import Pipeline
-from defshade_cli.plan import make_plan
+from defshade_cli.plan import make_plan, plan_moments
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderSettings
@@ -32,14 +34,16 @@ from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.stage import open_stage
 
 Picture = NDArray[np.float32]
+Places = tuple[tuple[float, float], ...]
 
 SAMPLES = {"arnold": 64, "viewer": 4, "none": 4}
 OPACITY_SAMPLES = 64
-"""At each of Storm's four places, so that the mean of coins is an opacity."""
+"""At each of Storm's places, so that the mean of coins is an opacity."""
 _NARROWEST = 1e-3  # pixels
 
-MULTISAMPLE = ((0.375, 0.875), (0.875, 0.625), (0.125, 0.375), (0.625, 0.125))
+MULTISAMPLE: Places = ((0.375, 0.875), (0.875, 0.625), (0.125, 0.375), (0.625, 0.125))
 """Where OpenGL takes the four samples of a pixel, from its upper left corner: Direct3D's places upside down."""
+_CENTRE: Places = ((0.5, 0.5),)
 
 _LARGEST = 640  # pixels across, of pictures that are only looked at
 _BACKDROP = (0.2, 0.2, 0.2)
@@ -64,9 +68,13 @@ def draw(case: Case, pipeline: Pipeline) -> Drawn:
     """Raises the errors of errors.py."""
     reference = read(case.image)["beauty"] if case.image else None
     start = time.perf_counter()
-    scene = _scene(case, _size(case, reference))
+    size = _size(case, reference)
+    stage = _stage(case)
+    reader = _reader(case, stage, size)
+    scene = _scene(case, stage, reader)
     read_at = time.perf_counter()
-    pixels, alpha = _render(case, pipeline, scene, _size(case, reference), shows_sky=_shows_sky(case, reference))
+    settings = RenderSettings(size=size, shadows=case.maker != "storm", background=_shows_sky(case, reference))
+    pixels, alpha = _render(case, pipeline, scene, reader, settings)
     seconds = {"read": read_at - start, "draw": time.perf_counter() - read_at}
     unsupported = tuple(f"{issue.path}: {issue.reason}" for issue in scene.unsupported)
     drawn = Drawn({"ours": _shown(case, pixels)}, unsupported, seconds)
@@ -87,16 +95,27 @@ def _compared(case: Case, drawn: Drawn, alpha: Picture, reference: Picture) -> D
     )
 
 
-def _scene(case: Case, size: tuple[int, int]) -> Scene:
-    conditions = case.conditions
+def _stage(case: Case) -> Any:
+    """Usd.Stage, as the reference's maker understands it."""
     stage = open_stage(case.stage)
-    reader = StageReader(
+    if case.maker == "arnold":
+        read_as_arnold(stage)
+    return stage
+
+
+def _reader(case: Case, stage: Any, size: tuple[int, int]) -> StageReader:
+    conditions = case.conditions
+    return StageReader(
         stage,
         camera=conditions.camera,
         purposes=conditions.purposes,
         complexity=conditions.complexity,
         size=size,
     )
+
+
+def _scene(case: Case, stage: Any, reader: StageReader) -> Scene:
+    conditions = case.conditions
     frame = reader.first_frame() if conditions.frame == "first" else conditions.frame
     return under(conditions, reader.read(frame), stage_extent(stage, conditions.purposes))
 
@@ -117,28 +136,42 @@ def _shows_sky(case: Case, reference: Picture | None) -> bool:
 
 
 def _render(
-    case: Case, pipeline: Pipeline, scene: Scene, size: tuple[int, int], *, shows_sky: bool
+    case: Case, pipeline: Pipeline, scene: Scene, reader: StageReader, settings: RenderSettings
 ) -> tuple[Picture, Picture]:
     """(H, W, 4) scene-linear, premultiplied, and (H, W) alpha; with Storm's samples where it drew the reference."""
-    settings = RenderSettings(size=size, shadows=case.maker != "storm", background=shows_sky)
     if case.maker not in ("storm", "usdrecord"):
-        plan = make_plan(scene, replace(settings, samples=SAMPLES[case.maker]))
-        pixels = pipeline.render(scene, plan).layers["beauty"]
+        pixels = _filtered(pipeline, scene, reader, replace(settings, samples=SAMPLES[case.maker]))
         return pixels, pixels[..., 3]
     if case.conditions.lighting == "unlit":
         settings = replace(settings, layers=("depth", "albedo"))
-    pixels = np.mean([_pixels(film) for film in _multisampled(pipeline, scene, settings)], axis=0)
-    if not make_plan(scene, settings).cutout:
+    cutout = make_plan(scene, settings).cutout
+    coins = replace(settings, layers=("alpha",), samples=OPACITY_SAMPLES, filter_width=_NARROWEST)
+    places = _CENTRE if cutout and _blends(pipeline, scene, coins) else MULTISAMPLE
+    pixels = np.mean([_pixels(film) for film in _taken(pipeline, scene, settings, places)], axis=0)
+    if not cutout:
         return pixels, pixels[..., 3]
-    settings = replace(settings, layers=("alpha",), samples=OPACITY_SAMPLES, filter_width=_NARROWEST)
-    alpha = [film.layers["alpha"][..., 0] for film in _multisampled(pipeline, scene, settings)]
+    alpha = [film.layers["alpha"][..., 0] for film in _taken(pipeline, scene, coins, places)]
     return pixels, np.mean(alpha, axis=0)
 
 
-def _multisampled(pipeline: Pipeline, scene: Scene, settings: RenderSettings) -> Iterator[Film]:
-    """A film for each of Storm's places in the pixel."""
+def _blends(pipeline: Pipeline, scene: Scene, coins: RenderSettings) -> bool:
+    """Whether anything is seen through: Storm switches multisampling off while it blends, we for all of the picture."""
+    (film,) = _taken(pipeline, scene, coins, _CENTRE)
+    alpha = film.layers["alpha"]
+    return bool(((alpha > 0.0) & (alpha < 1.0)).any())
+
+
+def _filtered(pipeline: Pipeline, scene: Scene, reader: StageReader, settings: RenderSettings) -> Picture:
+    """The beauty as the program renders it, while the shutter is open."""
     plan = make_plan(scene, settings)
-    for place in MULTISAMPLE:
+    moments = plan_moments(plan, reader.read_shutter(scene, plan.moments), settings)
+    return pipeline.render(scene, plan, moments).layers["beauty"]
+
+
+def _taken(pipeline: Pipeline, scene: Scene, settings: RenderSettings, places: Places) -> Iterator[Film]:
+    """A film for each place in the pixel."""
+    plan = make_plan(scene, settings)
+    for place in places:
         moved = replace(scene, camera=_moved(plan.camera, plan.size, place))
         yield pipeline.render(moved, make_plan(moved, settings))
 

@@ -5,16 +5,17 @@ from __future__ import annotations
 from defshade_cli.measure.conformance.catalogue import Case
 from defshade_cli.measure.conformance.results import LEAST_IOU
 
-_DISCS = "Storm draws points as discs that face the image, and cuts or clamps them as such; ours are spheres"
+_DISCS = "Storm draws points as discs that face the image, a pixel narrower than they are; ours are spheres"
 _VOLUME = "volumes are reported, not drawn"
 
 _REASONS = {
     "testUsdImagingGLPoints": _DISCS,
     "testUsdImagingGLPoints_clipped": _DISCS,
-    "testUsdImagingGLPoints_zoom": f"{_DISCS}: no larger than GL's largest point",
+    "testUsdImagingGLPoints_zoom": f"{_DISCS}: none wider than 100 pixels",
     "testUsdImagingGLPoints_zoom_pan": _DISCS,
     "testUsdImagingGLVaryingTopology_003": _DISCS,
     "testUsdImagingGLCurves": "at complexity 1.0 Storm draws curves as lines one pixel wide",
+    "testUsdImagingGLCurves_refined": "Storm draws ribbons in pieces of 20 pixels, with gaps where they bend",
     "testUsdImagingGLVdbVolumeFallbackMaterial_001": _VOLUME,
     "testUsdImagingGLVdbVolumeFallbackMaterial_002": _VOLUME,
     "testUsdImagingGLVdbVolumeFallbackMaterial_003": _VOLUME,
@@ -22,7 +23,9 @@ _REASONS = {
 """By the reference's name."""
 
 _STAGES = {
-    "test_1547.2/data/test.usda": "Arnold's own primvars make a light of the sphere, and hide it from the camera",
+    "test_2300/data/test.usda": (
+        "a cube of 15 pixels, whose edges lie in the middles of pixels: 16 samples do not decide"
+    ),
 }
 
 

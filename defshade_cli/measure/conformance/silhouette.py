@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 Mask = NDArray[np.bool_]
 Color = tuple[float, float, float]
 
-ANY_SAMPLE, HALF = 0.01, 0.5
+ANY_SAMPLE, HALF = 0.003, 0.5
 """Thresholds of alpha: something of a pixel, and half of it."""
 
 _STEP = 1.0 / 255.0
