@@ -21,10 +21,10 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench_stages import GENERATED, generate
 from glb import write_glb
 
 from defshade_cli.measure.layouts import replace_generated
-from stages import GENERATED, generate
 
 PEERS = Path(__file__).parent / "peers"
 LIMIT = 600.0

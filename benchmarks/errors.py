@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from bench_stages import generate
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
@@ -23,7 +24,6 @@ from defshade_cli.measure.pathtraced import mitsuba_world
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.settings import RenderJob, RenderSettings
-from stages import generate
 
 SIZE = (160, 90)
 PEER_SAMPLES, CONVERGED = 16, 512

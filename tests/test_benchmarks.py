@@ -20,7 +20,7 @@ FOLDER = Path(__file__).resolve().parent.parent / "benchmarks"
 @pytest.fixture
 def stages(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     monkeypatch.syspath_prepend(FOLDER)
-    return importlib.import_module("stages")
+    return importlib.import_module("bench_stages")
 
 
 def test_simple_is_as_it_is_stated(stages: ModuleType, tmp_path: Path) -> None:

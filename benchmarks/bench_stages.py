@@ -1,6 +1,6 @@
 """The stages that run times are stated for, generated.
 
-    python benchmarks/stages.py FOLDER [NAME...]
+    python benchmarks/bench_stages.py FOLDER [NAME...]
 
 simple      25 spheres of 4k triangles, metallic x roughness, on a plane; 1 distant, 4 sphere lights and 1 cone
 manylights  the same under 256 sphere lights
