@@ -15,25 +15,18 @@ _REASONS = {
     "testUsdImagingGLPoints_zoom_pan": _DISCS,
     "testUsdImagingGLVaryingTopology_003": _DISCS,
     "testUsdImagingGLCurves": "at complexity 1.0 Storm draws curves as lines one pixel wide",
-    "testUsdImagingGLCurves_refined": "Storm draws ribbons in pieces of 20 pixels, with gaps where they bend",
     "testUsdImagingGLVdbVolumeFallbackMaterial_001": _VOLUME,
     "testUsdImagingGLVdbVolumeFallbackMaterial_002": _VOLUME,
     "testUsdImagingGLVdbVolumeFallbackMaterial_003": _VOLUME,
 }
 """By the reference's name."""
 
-_STAGES = {
-    "test_2300/data/test.usda": (
-        "a cube of 15 pixels, whose edges lie in the middles of pixels: 16 samples do not decide"
-    ),
-}
-
 
 def remark_on(case: Case, iou: float | None) -> str:
     """One sentence without a full stop; empty where nothing needs saying."""
     if case.image is None or (iou is not None and iou >= LEAST_IOU):
         return ""
-    if reason := _REASONS.get(case.image.stem) or _STAGES.get(case.stage_name):
+    if reason := _REASONS.get(case.image.stem):
         return reason
     if iou is not None:
         return ""
