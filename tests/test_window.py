@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +24,8 @@ def test_a_window_holds_the_pixels_whose_centres_it_contains(
 ) -> None:
     xmin, xmax = sorted(corners[:2])
     ymin, ymax = sorted(corners[2:])
-    columns = np.arange(-500, 1000)
-    x = [c for c in columns if xmin <= (c + 0.5) / display[0] < xmax]
-    y = [c for c in columns if ymin < 1.0 - (c + 0.5) / display[1] <= ymax]
+    x = [c for c in range(-500, 1000) if xmin <= Fraction(2 * c + 1, 2 * display[0]) < xmax]
+    y = [c for c in range(-500, 1000) if ymin < 1 - Fraction(2 * c + 1, 2 * display[1]) <= ymax]
     if not x or not y:
         with pytest.raises(UsageError, match="no pixels"):
             from_ndc((xmin, ymin, xmax, ymax), display)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from math import ceil
 
 from defshade_cli.errors import UsageError
@@ -58,9 +59,10 @@ class DataWindow:
 def from_ndc(ndc: tuple[float, float, float, float], display: tuple[int, int]) -> DataWindow:
     """The pixels whose centres lie in (xmin, ymin, xmax, ymax), 0..1 over the display window, y up.
 
-    UsdRenderSettingsBase, dataWindowNDC. Raises UsageError where there are none.
+    UsdRenderSettingsBase, dataWindowNDC. Fractions, since a centre on the border is in or out as the numbers say.
+    Raises UsageError where there are none.
     """
-    xmin, ymin, xmax, ymax = ndc
-    columns = [ceil(x * display[0] - 0.5) for x in (xmin, xmax)]
-    rows = [ceil((1.0 - y) * display[1] - 0.5) for y in (ymax, ymin)]
+    xmin, ymin, xmax, ymax = (Fraction(value) for value in ndc)
+    columns = [ceil(x * display[0] - Fraction(1, 2)) for x in (xmin, xmax)]
+    rows = [ceil((1 - y) * display[1] - Fraction(1, 2)) for y in (ymax, ymin)]
     return DataWindow(columns[0], rows[0], columns[1] - columns[0], rows[1] - rows[0])
