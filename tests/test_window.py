@@ -33,6 +33,11 @@ def test_a_window_holds_the_pixels_whose_centres_it_contains(
         assert from_ndc((xmin, ymin, xmax, ymax), display) == DataWindow(x[0], y[0], len(x), len(y))
 
 
+def test_a_window_that_is_not_finite_is_refused() -> None:
+    with pytest.raises(UsageError, match="no pixels"):
+        from_ndc((0.0, 0.0, float("nan"), 1.0), (64, 48))
+
+
 def test_the_whole_image_is_the_default() -> None:
     assert from_ndc((0.0, 0.0, 1.0, 1.0), (1920, 1081)) == DataWindow(0, 0, 1920, 1081)
 

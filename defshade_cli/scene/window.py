@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from math import ceil
+from math import ceil, isfinite
 
 from defshade_cli.errors import UsageError
 from defshade_cli.spaces import Window
@@ -60,8 +60,10 @@ def from_ndc(ndc: tuple[float, float, float, float], display: tuple[int, int]) -
     """The pixels whose centres lie in (xmin, ymin, xmax, ymax), 0..1 over the display window, y up.
 
     UsdRenderSettingsBase, dataWindowNDC. Fractions, since a centre on the border is in or out as the numbers say.
-    Raises UsageError where there are none.
+    Raises UsageError where there are none, or where a border is not finite.
     """
+    if not all(isfinite(border) for border in ndc):
+        raise UsageError(f"a data window of {ndc} has no pixels")
     xmin, ymin, xmax, ymax = (Fraction(value) for value in ndc)
     columns = [ceil(x * display[0] - Fraction(1, 2)) for x in (xmin, xmax)]
     rows = [ceil((1 - y) * display[1] - Fraction(1, 2)) for y in (ymax, ymin)]
