@@ -14,6 +14,7 @@ from hypothesis.extra.numpy import arrays
 from defshade_cli.errors import UsageError
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.measure.conformance import batch
+from defshade_cli.measure.conformance.arnold import read_as_arnold
 from defshade_cli.measure.conformance.catalogue import assets_folder, read_item
 from defshade_cli.measure.conformance.conditions import under
 from defshade_cli.measure.conformance.drawing import draw
@@ -65,6 +66,15 @@ def test_each_makers_conditions_are_its_own(tmp_path: Path) -> None:
     assert (arnold.maker, arnold.conditions.size, arnold.conditions.frame) == ("arnold", (160, 90), 27.0)
     assert (usdrecord.maker, usdrecord.conditions.frame, usdrecord.conditions.complexity) == ("usdrecord", 5.0, "low")
     assert (viewer.maker, viewer.conditions.purposes) == ("viewer", ("default", "proxy"))
+
+
+def test_arnold_hides_geometry_from_the_camera_and_keeps_the_light_of_lights() -> None:
+    hidden = "custom bool primvars:arnold:visibility:camera = 0"
+    stage = stage_of(f'def Sphere "s" {{ {hidden} }} def Cube "c" {{}} def RectLight "l" {{ {hidden} }}')
+    read_as_arnold(stage)
+    scene = StageReader(stage).read(None)
+    assert [drawable.paths for drawable in scene.drawables] == [("/c",)]
+    assert [light.path for light in scene.lights] == ["/l"]
 
 
 def test_a_stage_without_references_is_a_case(tmp_path: Path) -> None:
