@@ -69,8 +69,8 @@ def test_each_makers_conditions_are_its_own(tmp_path: Path) -> None:
 
 
 def test_arnold_hides_geometry_from_the_camera_and_keeps_the_light_of_lights() -> None:
-    hidden = "custom bool primvars:arnold:visibility:camera = 0"
-    stage = stage_of(f'def Sphere "s" {{ {hidden} }} def Cube "c" {{}} def RectLight "l" {{ {hidden} }}')
+    hidden = "custom bool primvars:arnold:visibility:camera = 0\n"
+    stage = stage_of(f'def Sphere "s" {{ {hidden} }}\ndef Cube "c" {{}}\ndef RectLight "l" {{ {hidden} }}')
     read_as_arnold(stage)
     scene = StageReader(stage).read(None)
     assert [drawable.paths for drawable in scene.drawables] == [("/c",)]
