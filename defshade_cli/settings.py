@@ -11,6 +11,7 @@ Layout = Literal["rgba8", "packed", "float"]
 Shading = Literal["preview-surface", "classic"]
 Existing = Literal["overwrite", "skip", "error"]
 Complexity = Literal["auto", "low", "medium", "high", "veryhigh"]
+Lighting = Literal["auto", "volumes", "tiles"]
 Filter = Literal["box", "gaussian", "blackman-harris"]
 Payloads = Literal["all", "none"]
 OnNan = Literal["error", "warn", "fill"]
@@ -22,6 +23,7 @@ LAYOUTS: tuple[Layout, ...] = ("rgba8", "packed", "float")
 SHADINGS: tuple[Shading, ...] = ("preview-surface", "classic")
 EXISTING: tuple[Existing, ...] = ("overwrite", "skip", "error")
 COMPLEXITIES: tuple[Complexity, ...] = ("auto", "low", "medium", "high", "veryhigh")
+LIGHTINGS: tuple[Lighting, ...] = ("auto", "volumes", "tiles")
 PAYLOADS: tuple[Payloads, ...] = ("all", "none")
 ON_NAN: tuple[OnNan, ...] = ("error", "warn", "fill")
 COMPRESSIONS: tuple[Compression, ...] = ("zip", "zips", "piz", "dwaa", "none")
@@ -35,6 +37,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "layout": LAYOUTS,
     "shading": SHADINGS,
     "complexity": COMPLEXITIES,
+    "lighting": LIGHTINGS,
     "filter": tuple(FILTERS),
 }
 """Of RenderSettings, by the names of their fields."""
@@ -118,6 +121,7 @@ class RenderSettings:
     debug: what is drawn over the beauty: the lights' volumes.
     background: dome lights are seen behind the geometry, and cover there.
     motion_blur: several samples see as many moments of the camera's shutter.
+    lighting: lights as blended volumes or by tiles of the image; auto takes what is predicted to be cheaper.
     light_tolerance: scene-linear value that all dropped light together may reach in one pixel.
     """
 
@@ -139,6 +143,7 @@ class RenderSettings:
     exposure: float = 0.0
     purposes: tuple[str, ...] | None = None
     light_tolerance: float = 1e-5
+    lighting: Lighting = "auto"
     shadows: bool = True
     complexity: Complexity = "auto"
     fit: bool = False

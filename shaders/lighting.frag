@@ -1,57 +1,9 @@
-#include "lib/view.glsl"
-#include "lib/surface.glsl"
-#include "lib/light.glsl"
-#include "lib/shadow.glsl"
-#ifdef PLANE_LINKS
-#include "lib/linking.glsl"
-#endif
-#include "lib/render_space.glsl"
-#include "generated/planes.glsl"
+#include "lib/shading.glsl"
 #include "generated/outputs.glsl"
-
-#ifdef PATCHES
-float turn_at(Surface s, ivec2 pixel) {
-#ifdef PLANE_WEIGHTS
-    return s.turn;             // the neighbours may show what lies behind
-#else
-    ivec2 inward = ivec2(lessThan(vec2(pixel) * 2.0, view.size)) * 2 - 1;
-    vec3 across = read_planes(pixel + ivec2(inward.x, 0)).normal - s.normal;
-    vec3 along = read_planes(pixel + ivec2(0, inward.y)).normal - s.normal;
-    return turn_of(across, along);
-#endif
-}
-
-// How much alpha² grows where a sample stands for its share of a pixel in which the normal turns: Tokuyoshi & Kaplanyan
-// 2019, "Improved Geometric Specular Antialiasing", 2 sigma² = 1 / pi and at most 0.18. Shares shrink with the number of
-// samples, so the mean still converges; without, single samples would hit highlights that are smaller than a pixel.
-float pixel_alpha_squared(Surface s, ivec2 pixel) {
-    float sharpest = s.roughness;
-#ifdef PLANE_CLEARCOAT
-    if (s.clearcoat > 0.0) sharpest = min(sharpest, s.clearcoat_roughness);
-#endif
-    if (view.pixel_share == 0.0 || sharpest > 0.35) return 0.0;
-    return view.pixel_share * min(turn_at(s, pixel) / PI, 0.18);
-}
-#endif
 
 flat in Light light;
 
-// What of each lobe a light may show: the environment pass shows a dome in the sharp ones.
-vec3 lobe_response(Light light, Surface s) {
-    vec3 response = light.response.xyy;
-#ifdef PLANE_WEIGHTS
-    response *= s.weights.xyy;
-#endif
-#ifdef SKY
-    if (light.is_sky == 0u) return response;
-#ifdef PLANE_CLEARCOAT
-    response.z *= 1.0 - sharpness(s.clearcoat_roughness, view.pixel_share);
-#endif
-    response.y *= 1.0 - sharpness(s.roughness, view.pixel_share);
-#endif
-    return response;
-}
-
+// One light on what its volume covers.
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     float stored = texelFetch(plane_depth, pixel, 0).x;
@@ -64,34 +16,10 @@ void main() {
         return;
     }
     Surface surface = read_planes(pixel);
-#ifdef PLANE_LINKS
-    if (!is_linked(light.first_link, surface.link_set)) {
+    if (!is_lit_by(light, surface)) {
         write_nothing();
         return;
     }
-#endif
-    Lit lit;
-    lit.sent = dot(irradiance, vec3(1.0)) * max(dot(surface.normal, l), 0.0);
-    lit.volumes = 1.0;
-    lit.visible = visibility(light, position, l);
-#ifdef SHADOW_STYLES
-    irradiance *= mix(light.shadow_color, vec3(1.0), lit.visible);
-#else
-    irradiance *= lit.visible;
-#endif
-    vec3 response = lobe_response(light, surface);
-#ifdef PATCHES
-    float widening = patch_alpha_squared(light, position, l) + pixel_alpha_squared(surface, pixel);
-    if (widening > 0.0) {
-        surface.roughness = widened_roughness(surface.roughness, widening);
-        surface.clearcoat_roughness = widened_roughness(surface.clearcoat_roughness, widening);
-    }
-#endif
-    vec3 v = direction_to_eye(position);
-    vec3 arriving = view.exposure * render_from_rec709(irradiance);
-    lit.radiance = arriving * evaluate_brdf(surface, v, l, response);
-#ifdef SPLIT
-    lit.diffuse = arriving * evaluate_brdf(surface, v, l, vec3(response.x, 0.0, 0.0));
-#endif
-    write_light(lit);
+    float widening = pixel_alpha_squared(surface, pixel);
+    write_light(exposed(lit_by(light, l, irradiance, surface, position, direction_to_eye(position), widening)));
 }

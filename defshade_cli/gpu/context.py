@@ -88,6 +88,11 @@ class Gpu:
         """Largest width or height of a target, pixels."""
         return int(self.context.info["GL_MAX_TEXTURE_SIZE"])
 
+    @property
+    def max_uniform_bytes(self) -> int:
+        """Of one uniform block."""
+        return int(self.context.info["GL_MAX_UNIFORM_BLOCK_SIZE"])
+
     def keep(self, resource: Releasable) -> Releasable:
         """Release `resource` when this Gpu closes."""
         self._stack.callback(resource.release)

@@ -13,7 +13,7 @@ from defshade_cli.gpu.planes import MOST_TARGETS
 OUTPUTS: dict[str, str] = {
     "diffuse": "vec4(lit.diffuse, 0.0)",
     "specular": "vec4(lit.radiance - lit.diffuse, 0.0)",
-    "shadow": "vec4(lit.sent * lit.visible, lit.sent, 0.0, 0.0)",
+    "shadow": "vec4(lit.arrived, lit.sent, 0.0, 0.0)",
     "lightComplexity": "vec4(lit.volumes)",
 }
 """Layer → GLSL value from `Lit lit`."""

@@ -19,8 +19,11 @@ from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 
-VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS, TEXTURE_INPUTS, TILES, LINKS, MOTIONS = range(9)
+VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS, TEXTURE_INPUTS, TILES, LINKS, MOTIONS, LIGHT_LISTS = range(10)
 """Binding points of the storage buffers, as the shaders declare them."""
+
+LIGHT_BLOCK = 0
+"""Binding point of the one uniform buffer."""
 
 INDICES_IN_POOL = 2
 """Which of the vertex arrays has a row a triangle; the others have one a vertex."""
@@ -32,14 +35,14 @@ _TURNS = 8
 
 
 class RecordBuffer:
-    """A storage buffer of records at one binding; it grows as it must.
+    """A storage buffer of records at one binding, or a uniform one; it grows as it must.
 
     llvmpipe does not know which storage buffers its queued draws still read, so there a write goes to the next of a
     few, and waits for the draws once they have all been written.
     """
 
-    def __init__(self, gpu: Gpu, binding: int) -> None:
-        self._gpu, self._binding = gpu, binding
+    def __init__(self, gpu: Gpu, binding: int, *, uniform: bool = False) -> None:
+        self._gpu, self._binding, self._uniform = gpu, binding, uniform
         self._buffers = [gpu.keep(gpu.context.buffer(reserve=256)) for _ in range(_TURNS if gpu.is_software else 1)]
         self._turn = 0
 
@@ -52,7 +55,8 @@ class RecordBuffer:
         if len(data) > buffer.size:
             buffer.orphan(len(data))
         buffer.write(data)
-        buffer.bind_to_storage_buffer(self._binding)
+        bind = buffer.bind_to_uniform_block if self._uniform else buffer.bind_to_storage_buffer
+        bind(self._binding)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -22,6 +22,7 @@ class Frame:
         self._gbuffers: dict[tuple[tuple[Plane, ...], Layout], GBuffer] = {}
         self._radiance: dict[tuple[str, GBuffer | None], Target] = {}
         self._lights: tuple[tuple, LightTargets | None] = (), None
+        self._ranges: Target | None = None
 
     def gbuffer(self, size: Size, planes: tuple[Plane, ...], layout: Layout) -> GBuffer:
         """The GBuffer of (width, height) in a layout, as last drawn. Raises GpuError."""
@@ -38,6 +39,14 @@ class Frame:
             depth = gbuffer.target.depth if gbuffer else None
             self._radiance[key] = allocate(self._gpu, size, {"radiance": (components, "f4")}, depth)
         return self._radiance[key]
+
+    def depth_ranges(self, tiles: Size) -> Target:
+        """A texture "range" of two floats for each of (columns, rows) tiles. Raises GpuError."""
+        if self._ranges is None or self._ranges.framebuffer.size != tiles:
+            if self._ranges:
+                self._ranges.release()
+            self._ranges = allocate(self._gpu, tiles, {"range": (2, "f4")})
+        return self._ranges
 
     def light_targets(self, radiance: Target, plan: Plan) -> LightTargets:
         """For the plan's lights, behind the radiance of a sample; those of another kind of plan are freed."""

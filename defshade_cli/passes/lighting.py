@@ -20,7 +20,6 @@ from defshade_cli.gpu.outputs import output_defines, outputs_source
 from defshade_cli.gpu.planes import Plane, read_source, uses_standard_depth
 from defshade_cli.gpu.records import record
 from defshade_cli.gpu.render_space import space_defines
-from defshade_cli.image.layers import DEFAULT_GROUP
 from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.light_targets import LightTargets
@@ -45,6 +44,7 @@ _NO_IES = 0xFFFFFFFF
 class LightingVariant:
     """What the pass is compiled for.
 
+    responses: some light shows in one lobe more than in the other.
     shaped: cones, focus or profiles of IES.  profiles: some point does not shine alike all around.
     patches: points stand for some area of their light, and samples for some of their pixel.  sky: points of a dome.
     volumes: the kinds that some light has.  outputs: layers beside the radiance.  groups: those that one light is in.
@@ -57,6 +57,7 @@ class LightingVariant:
     shadows: bool
     shadow_styles: bool
     ies: bool
+    responses: bool
     shaped: bool
     profiles: bool
     patches: bool
@@ -67,10 +68,12 @@ class LightingVariant:
     space: RenderSpace = REC709
 
     @classmethod
-    def of(cls, plan: Plan) -> LightingVariant:
+    def of(cls, plan: Plan, chosen: Sequence[PlannedLight] | None = None) -> LightingVariant:
+        """For some of the plan's lights, or for all."""
+        chosen = plan.lights if chosen is None else chosen
         orthographic = plan.camera.projection == "orthographic"
-        lights = [planned.light for planned in plan.lights]
-        patches = plan.samples > 1 or any(planned.points > 1 for planned in plan.lights)
+        lights = [planned.light for planned in chosen]
+        patches = plan.samples > 1 or any(planned.points > 1 for planned in chosen)
         return cls(
             plan.planes,
             plan.layout,
@@ -78,14 +81,15 @@ class LightingVariant:
             orthographic,
             plan.shadows,
             plan.shadow_styles,
-            bool(plan.profiles),
+            any(light.shaping and light.shaping.ies for light in lights),
+            any((light.diffuse, light.specular) != (1.0, 1.0) for light in lights),
             any(light.shaping for light in lights),
             patches or any(light.profile != "uniform" for light in lights),
             patches,
-            patches and bool(plan.domes),
-            plan.volumes,
+            patches and any(light.kind == "dome" for light in lights),
+            tuple(dict.fromkeys(planned.volume for planned in chosen)),
             plan.outputs,
-            plan.most_groups,
+            max((len(planned.groups) for planned in chosen), default=0),
             plan.render_space,
         )
 
@@ -96,6 +100,7 @@ class LightingVariant:
             ["SHADOWS"] * self.shadows
             + ["SHADOW_STYLES"] * self.shadow_styles
             + ["IES"] * self.ies
+            + ["RESPONSES"] * self.responses
             + ["SHAPED"] * self.shaped
             + ["PROFILES"] * self.profiles
             + ["PATCHES"] * self.patches
@@ -114,27 +119,12 @@ class LightingPass:
             "generated/planes.glsl": read_source(variant.planes, variant.layout),
             "generated/outputs.glsl": outputs_source(variant.outputs, variant.groups),
         }
-        emission = gpu.shaders.program("screen.vert", "emission.frag", defines=variant.defines, generated=generated)
-        self._emission = screen.array(emission)
         self._volumes: dict[Volume, moderngl.VertexArray] = {}
         for volume in variant.volumes:
             defines = variant.defines + ["VOLUME_QUAD"] * (volume == "quad")
             files = (f"light_{volume}.vert", "lighting.frag")
             program = gpu.shaders.program(*files, defines=defines, generated=generated)
             self._volumes[volume] = screen.array(program) if volume == "quad" else volume_array(gpu, volume, program)
-
-    def begin(self, gbuffer: GBuffer, targets: LightTargets) -> None:
-        """Emission and coverage: the sample's radiance is overwritten, and the group of what is emitted grows."""
-        targets.radiance.framebuffer.use()
-        targets.radiance.framebuffer.depth_mask = False
-        self._context.enable_only(moderngl.NOTHING)
-        gbuffer.bind(self._emission.program)
-        self._screen.draw(self._emission)
-        if DEFAULT_GROUP in targets.sums:
-            targets.sums[DEFAULT_GROUP].framebuffer.use()
-            self._context.enable_only(moderngl.BLEND)
-            self._context.blend_func = moderngl.ONE, moderngl.ONE
-            self._screen.draw(self._emission)
 
     def add(
         self,

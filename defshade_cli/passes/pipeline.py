@@ -14,12 +14,14 @@ from defshade_cli.gpu.residence import LIGHTS, MOTIONS, VIEW, DrawList, GpuScene
 from defshade_cli.image.film import Film, Sampling
 from defshade_cli.passes.accumulation import AccumulationPass
 from defshade_cli.passes.debug_volumes import DebugVolumesPass, laid_over
+from defshade_cli.passes.emission import EmissionPass
 from defshade_cli.passes.emitters import LitSample, light_batches
 from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
 from defshade_cli.passes.identification import Manifests, Mattes, id_manifests
 from defshade_cli.passes.light_targets import LightTargets
+from defshade_cli.passes.light_tiles import LightTiles
 from defshade_cli.passes.lighting import LightingPass, LightingVariant, light_records
 from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.motion import motion_records, neighbouring_points
@@ -51,10 +53,12 @@ class Pipeline:
         self._motions = RecordBuffer(gpu, MOTIONS)
         self._screen, self._mask = Screen(gpu), TileMask(gpu)
         self._gbuffer_pass = cache(lambda variant: GBufferPass(gpu, variant))
+        self._emission_pass = cache(lambda variant: EmissionPass(gpu, variant, self._screen))
         self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant, self._screen))
         self._environment_pass = cache(lambda variant: EnvironmentPass(gpu, variant, self._screen))
         self._sky_visibility_pass = cache(lambda variant: SkyVisibilityPass(gpu, variant, self._screen))
         self._shadow_pass = cache(lambda variant: ShadowPass(gpu, variant))
+        self._light_tiles = LightTiles(gpu, self._frame)
         self._tables = TableStore(gpu)
         self._accumulation = AccumulationPass(gpu, self._frame, self._screen)
         self._debug_volumes_pass = cache(lambda: DebugVolumesPass(gpu))
@@ -168,16 +172,22 @@ class Pipeline:
         visibility: SkyVisibility | None,
     ) -> None:
         """One sample of every light: as many at a time as the shadow atlas holds; then the skies, seen as they let."""
-        lighting = self._lighting_pass(LightingVariant.of(plan))
-        lighting.begin(gbuffer, targets)
-        openness = self._sky_visibility_pass(LightingVariant.of(plan)) if visibility else None
+        variant = LightingVariant.of(plan)
+        self._emission_pass(variant).draw(gbuffer, targets)
+        if plan.tiled:
+            self._light_tiles.begin(gbuffer, view_record(plan, gbuffer.layout, sample), plan)
+        openness = self._sky_visibility_pass(variant) if visibility else None
         if openness and visibility:
             openness.begin_sample(visibility)
         for batch in light_batches(scene, plan, sample) if plan.lit else ():
             shadows = self._shadow_maps(draws, batch, plan, sample, tables) if plan.shadows else None
             lights, emitters = [lit.planned for lit in batch], [lit.emitter for lit in batch]
-            self._lights.write(light_records(lights, emitters, plan.camera.position, shadows, tables))
-            lighting.add(lights, gbuffer, targets, shadows, tables)
+            records = light_records(lights, emitters, plan.camera.position, shadows, tables)
+            self._lights.write(records)
+            if plan.tiled:
+                self._light_tiles.add(lights, records, gbuffer, targets, shadows, tables)
+            else:
+                self._lighting_pass(variant).add(lights, gbuffer, targets, shadows, tables)
             if openness and visibility and shadows:
                 openness.add(lights, plan, gbuffer, visibility, shadows)
         for dome in plan.domes:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from defshade_cli.gpu.planes import PLANES
+from defshade_cli.plan.cost import covered_share
 
 if TYPE_CHECKING:
     from defshade_cli.plan.plan import Plan
@@ -33,6 +34,9 @@ def explain(plan: Plan) -> Iterator[Decision]:
     for volume in ("quad", "sphere", "cone"):
         count = sum(planned.volume == volume for planned in plan.lights)
         yield Decision(f"{volume} volumes", f"{count} drawn" if count else "skipped", "lights that reach geometry")
+    if plan.lights:
+        covered = f"volumes cover the image {covered_share(plan.lights, plan.camera):.1f} times"
+        yield Decision("lighting", plan.lighting, covered)
     parts = bool(plan.outputs or plan.groups)
     yield _kept("light in parts", parts, "layers show lobes, groups or shadows", "no layer shows a part of the light")
     yield _kept("shadow maps", plan.shadows, "a light casts them", "no light casts any, or none were asked")

@@ -14,6 +14,7 @@ from defshade_cli.gpu.planes import MOST_PRIMVARS, MOST_TARGETS, Plane, named_pl
 from defshade_cli.image.layers import BEAUTY, LAYERS, PRIMVAR_FAMILY, resolve
 from defshade_cli.image.ocio import find_render_space
 from defshade_cli.image.render_space import RenderSpace
+from defshade_cli.plan.cost import choose_lighting
 from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.groups import light_groups, light_outputs
 from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
@@ -26,7 +27,7 @@ from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.shadow import PLAIN
 from defshade_cli.scene.window import DataWindow, from_ndc
-from defshade_cli.settings import FILTERS, Complexity, Debug, Filter, Layout, RenderSettings, Shading
+from defshade_cli.settings import FILTERS, Complexity, Debug, Filter, Layout, Lighting, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
 from defshade_cli.units import exposure_scale
 
@@ -45,7 +46,7 @@ class Plan:
     samples: a pixel at most.  max_error, time_limit: of RenderSettings.  filter_width: pixels.
     moments: of the shutter that the samples see, in turn; 0 without motion blur.
     planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
-    lights: sorted quads, spheres, cones.
+    lights: sorted quads, spheres, cones.  lighting: how they are drawn, volumes or tiles.
     shadows: some light casts them.  shadow_linked: in some light not all geometry does.
     background: domes are seen where no geometry is.
     cutout: some opacity may be below 1.  transparent: and scales the diffuse alone.
@@ -76,6 +77,7 @@ class Plan:
     planes: tuple[Plane, ...]
     data_planes: tuple[Plane, ...]
     lights: tuple[PlannedLight, ...]
+    lighting: Lighting
     shadows: bool
     shadow_linked: bool
     background: bool
@@ -173,6 +175,11 @@ class Plan:
         return self.shadows and any(p.light.casts_shadow and p.light.shadow != PLAIN for p in self.lights)
 
     @property
+    def tiled(self) -> bool:
+        """Are lights binned to tiles of the image?"""
+        return self.lighting == "tiles"
+
+    @property
     def profiles(self) -> tuple[IesProfile, ...]:
         """The IES profiles of the lights, each once."""
         shapings = [planned.light.shaping for planned in self.lights]
@@ -187,7 +194,8 @@ class Plan:
     def passes(self) -> tuple[str, ...]:
         """Names of the passes in the order of the pipeline."""
         before = ("gbuffer", "emission", *("environment",) * bool(self.domes), *("shadow maps",) * self.shadows)
-        lighting = before + tuple(f"light {volume}" for volume in self.volumes)
+        light = ("light tiles",) * bool(self.lights) if self.tiled else tuple(f"light {kind}" for kind in self.volumes)
+        lighting = before + light
         accumulation = ("accumulation",) * (self.samples > 1) + ("batch means",) * self.tracks_error
         accumulation += (f"debug {self.debug}",) * (self.debug is not None)
         return (lighting + accumulation if self.sampled else ()) + ("data gbuffer",) * self.data_pass
@@ -230,6 +238,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         planes=planes,
         data_planes=data_planes,
         lights=lights,
+        lighting=choose_lighting(lights, camera, settings, layers),
         shadows=shadows,
         shadow_linked=shadows and scene.shadow_linked,
         background=settings.background,

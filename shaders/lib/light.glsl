@@ -1,11 +1,26 @@
 #include "lib/records.glsl"
 #include "lib/constants.glsl"
 
+#ifdef LIGHTS_A_DRAW
+layout(std140, binding = 0) uniform LightBlock { Light lights[LIGHTS_A_DRAW]; };
+#else
 layout(std430, binding = 3) readonly buffer LightBlock { Light lights[]; };
+#endif
 
 const uint PROFILE_UNIFORM = 0u;
 const uint PROFILE_COSINE = 1u;
 const uint PROFILE_SINE = 2u;
+
+// Does it shine from one direction everywhere? The reach of such lights is infinite.
+bool is_distant(Light light) {
+#if defined(VOLUME_QUAD)
+    return true;
+#elif defined(VOLUMES_MIXED)
+    return light.reach > 3.0e38;
+#else
+    return false;
+#endif
+}
 
 #ifdef SHAPED
 // UsdLuxShapingAPI: cone with softness, focus with tint; `cosine` is between the axis and the direction of emission.
@@ -49,21 +64,18 @@ float profile(Light light, vec3 emission_direction) {
 // "Improved Geometric Specular Antialiasing". Patches shrink with the number of samples, so the mean still converges.
 float patch_alpha_squared(Light light, vec3 position, vec3 l) {
     if (light.extent == 0.0) return 0.0;
-#ifdef VOLUME_QUAD
-    float solid_angle = light.extent;
-#else
     vec3 to_light = light.position - position;
-    float solid_angle = light.extent * profile(light, -l) / dot(to_light, to_light);
-#endif
+    float solid_angle = light.extent;
+    if (!is_distant(light)) solid_angle *= profile(light, -l) / dot(to_light, to_light);
     return solid_angle / (8.0 * PI);
 }
 
 // Light from `light` at a relative position: the unit vector towards it, and the irradiance on a surface facing it.
 vec3 irradiance_from(Light light, vec3 position, out vec3 l) {
-#ifdef VOLUME_QUAD
-    l = -light.axis;
-    return light.intensity;
-#else
+    if (is_distant(light)) {
+        l = -light.axis;
+        return light.intensity;
+    }
     vec3 to_light = light.position - position;
     float distance_squared = dot(to_light, to_light);
     l = to_light * inversesqrt(distance_squared);
@@ -79,5 +91,4 @@ vec3 irradiance_from(Light light, vec3 position, out vec3 l) {
     emitted *= ies(light, l, atan(sine, cosine));
 #endif
     return emitted;
-#endif
 }

@@ -22,11 +22,8 @@ vec4 shadow_strength(Light light, ShadowMap map, vec4 stored, float receiver, ve
     if (light.shadow_distance < 0.0) return vec4(1.0);
     vec4 occluders = map.depth_coefficients.x * stored + map.depth_coefficients.y;
     float own = map.depth_coefficients.x * receiver + map.depth_coefficients.y;
-#ifdef VOLUME_QUAD
     vec4 apart = own - occluders;
-#else
-    vec4 apart = length(light.position - position) * (1.0 - own / occluders);
-#endif
+    if (!is_distant(light)) apart = length(light.position - position) * (1.0 - own / occluders);
     vec4 left = light.shadow_distance - apart;
     if (light.shadow_fading <= 0.0) return vec4(greaterThanEqual(left, vec4(0.0)));
     return pow(clamp(left / light.shadow_fading, 0.0, 1.0), vec4(light.shadow_gamma));

@@ -110,6 +110,14 @@ def _shading_options() -> list[Function]:
             "volumes and faster frames.",
         ),
         option(
+            "--lighting",
+            type=click.Choice(settings.LIGHTINGS),
+            default=_RENDER.lighting,
+            default_text=str(_RENDER.lighting),
+            help="Lights as volumes that are blended over the image, or in lists by tiles of it: the same picture. "
+            "auto takes what is predicted to be cheaper.",
+        ),
+        option(
             "--debug",
             type=click.Choice(settings.DEBUGS),
             help="Draw over the beauty: volumes are the shapes around the lights' reach, each in a colour; what fills "

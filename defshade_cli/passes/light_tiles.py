@@ -1,0 +1,138 @@
+"""The lighting of many lights: the image in tiles, each with a list of the lights that may reach it.
+
+A pixel is shaded once for all of a draw's lights: what the GBuffer says of it is read once, and nothing but their sum
+is blended. The tiles' depths come from the GBuffer, the lists from light_lists.py. Lights are in a uniform block,
+whose elements a software rasteriser fetches faster than those of a storage buffer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.outputs import outputs_source
+from defshade_cli.gpu.planes import read_source
+from defshade_cli.gpu.records import record
+from defshade_cli.gpu.residence import LIGHT_BLOCK, LIGHT_LISTS, RecordBuffer
+from defshade_cli.passes.frame import Frame
+from defshade_cli.passes.gbuffer import GBuffer
+from defshade_cli.passes.light_lists import TILE, LightBounds, LightLists, list_lights, tile_boxes
+from defshade_cli.passes.light_targets import LightTargets
+from defshade_cli.passes.lighting import LightingVariant
+from defshade_cli.passes.screen import Screen
+from defshade_cli.passes.shadows import ShadowAtlas
+from defshade_cli.passes.tables import NO_TABLES, LightTables
+from defshade_cli.plan import Plan, PlannedLight
+from defshade_cli.settings import Layout
+
+_MOST_LIGHTS = 256
+"""A draw."""
+
+
+class LightTiles:
+    """The tiles of one image; the lights in as few draws as one program and one block allow."""
+
+    def __init__(self, gpu: Gpu, frame: Frame) -> None:
+        self._context, self._frame = gpu.context, frame
+        self._most = min(_MOST_LIGHTS, gpu.max_uniform_bytes // record("Light").itemsize)
+        self._block = RecordBuffer(gpu, LIGHT_BLOCK, uniform=True)
+        self._lists = RecordBuffer(gpu, LIGHT_LISTS)
+        self._depth_ranges = cache(lambda *kind: DepthRangesPass(gpu, *kind))
+        self._program = cache(lambda variant: _compile(gpu, variant, self._most))
+
+    def begin(self, gbuffer: GBuffer, view: NDArray, plan: Plan) -> None:
+        """What the tiles show, by the GBuffer and the View record that it was drawn with."""
+        self._plan, perspective = plan, plan.camera.projection == "perspective"
+        ranges = self._depth_ranges(gbuffer.layout, perspective)
+        depths = ranges.read(gbuffer, self._frame, plan.size)
+        window = view["window"][0].astype(np.float64)
+        self._boxes = tile_boxes(depths, window, plan.size, perspective=perspective)
+        self._camera_from_relative = np.linalg.inv(view["relative_from_camera"][0].T.astype(np.float64))
+
+    def add(
+        self,
+        lights: Sequence[PlannedLight],
+        records: NDArray,
+        gbuffer: GBuffer,
+        targets: LightTargets,
+        shadows: ShadowAtlas | None = None,
+        tables: LightTables = NO_TABLES,
+    ) -> None:
+        """All `lights` on top of what the targets hold. Shaped ones are apart: their shader costs twice as much."""
+        self._context.enable_only(moderngl.BLEND)
+        self._context.blend_func = moderngl.ONE, moderngl.ONE
+        kinds = [(planned.groups, planned.light.shaping is not None) for planned in lights]
+        for kind in dict.fromkeys(kinds):
+            members = np.array([number for number, other in enumerate(kinds) if other == kind])
+            program = self._program(LightingVariant.of(self._plan, [lights[number] for number in members]))
+            targets.of(kind[0]).use()
+            gbuffer.bind(program, shadow_atlas=shadows.depth if shadows else None, ies_tables=tables.candela)
+            for first in range(0, len(members), self._most):
+                self._draw(program, records[members[first : first + self._most]])
+
+    def _draw(self, program: moderngl.Program, records: NDArray) -> None:
+        lists = list_lights(light_bounds(records, self._camera_from_relative), self._boxes)
+        if not len(lists.tiles):
+            return
+        block = np.zeros(self._most, records.dtype)
+        block[: len(records)] = records
+        self._block.write(block)
+        self._lists.write(lists.lights)
+        regions, runs = (self._context.buffer(data.tobytes()) for data in (self._regions(lists), lists.runs))
+        array = self._context.vertex_array(program, [(regions, "4f/i", "region"), (runs, "2u/i", "run")])
+        array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(lists.tiles))
+        for each in (array, regions, runs):
+            each.release()
+
+    def _regions(self, lists: LightLists) -> NDArray[np.float32]:
+        """(T, 4) left, top, right, bottom of the tiles as shares of the image."""
+        row, column = np.divmod(lists.tiles, self._boxes.shape[1])
+        corners = np.column_stack([column, row, column + 1, row + 1]) * float(TILE)
+        return np.minimum(corners / np.array(self._plan.size * 2), 1.0).astype(np.float32)
+
+
+class DepthRangesPass:
+    """The depths between which a tile's pixels lie; compiled for a layout and a projection."""
+
+    def __init__(self, gpu: Gpu, layout: Layout, perspective: bool) -> None:
+        self._context, self._screen = gpu.context, Screen(gpu)
+        generated = {"generated/planes.glsl": read_source((), layout)}
+        defines = [f"LIGHT_TILE {TILE}"] + ["ORTHOGRAPHIC"] * (not perspective)
+        program = gpu.shaders.program("screen.vert", "depth_ranges.frag", defines=defines, generated=generated)
+        self._array = self._screen.array(program)
+
+    def read(self, gbuffer: GBuffer, frame: Frame, size: tuple[int, int]) -> NDArray[np.float64]:
+        """(rows, columns, 2) nearest and farthest planar depth, the other way round in tiles without geometry."""
+        target = frame.depth_ranges((-(-size[0] // TILE), -(-size[1] // TILE)))
+        target.framebuffer.use()
+        self._context.enable_only(moderngl.NOTHING)
+        gbuffer.bind(self._array.program)
+        self._screen.draw(self._array)
+        return target.read("range").astype(np.float64)
+
+
+def _compile(gpu: Gpu, variant: LightingVariant, most: int) -> moderngl.Program:
+    generated = {
+        "generated/planes.glsl": read_source(variant.planes, variant.layout),
+        "generated/outputs.glsl": outputs_source(variant.outputs, variant.groups),
+    }
+    far = "quad" in variant.volumes
+    distances = ["VOLUME_QUAD" if variant.volumes == ("quad",) else "VOLUMES_MIXED"] * far
+    defines = [*variant.defines, *distances, f"LIGHTS_A_DRAW {most}"]
+    return gpu.shaders.program("light_tiles.vert", "lighting_tiles.frag", defines=defines, generated=generated)
+
+
+def light_bounds(records: NDArray, camera_from_relative: NDArray[np.float64]) -> LightBounds:
+    """Of Light records."""
+    rotation, offset = camera_from_relative[:3, :3], camera_from_relative[:3, 3]
+    return LightBounds(
+        centre=records["position"].astype(np.float64) @ rotation.T + offset,
+        reach=records["reach"].astype(np.float64),
+        axis=records["axis"].astype(np.float64) @ rotation.T,
+        cone_angle=records["cone_angle"].astype(np.float64),
+    )
