@@ -1,7 +1,8 @@
 """What Arnold's reader makes of a stage by rules of its own, as opinions of the session layer.
 
 arnold-usd, libs/translator/reader/read_geometry.cpp: meshes are not subdivided, unless
-`primvars:arnold:subdiv_iterations` asks for it; `primvars:arnold:visibility:camera` hides prims from the camera. A light that it hides shines on.
+`primvars:arnold:subdiv_iterations` asks for it; `primvars:arnold:visibility:camera` hides prims from the camera.
+A light that it hides shines on.
 """
 
 from __future__ import annotations
