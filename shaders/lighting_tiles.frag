@@ -1,5 +1,6 @@
 #include "lib/shading.glsl"
 #include "generated/outputs.glsl"
+#include "generated/light_block.glsl"
 
 layout(std430, binding = 9) readonly buffer LightListBlock { uint light_lists[]; };
 
@@ -16,7 +17,7 @@ void main() {
     float widening = pixel_alpha_squared(surface, pixel);
     Lit total = Lit(vec3(0.0), vec3(0.0), 0.0, 0.0, float(tile_run.y));
     for (uint i = tile_run.x; i < tile_run.x + tile_run.y; ++i) {
-        Light light = lights[light_lists[i]];
+        Light light = light_at(light_lists[i]);
         vec3 l;
         vec3 irradiance = irradiance_from(light, position, l);
         if (irradiance == vec3(0.0) || !is_lit_by(light, surface)) continue;

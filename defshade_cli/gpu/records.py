@@ -52,6 +52,36 @@ def record_of(body: str) -> np.dtype:
     return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
 
 
+def block_source(name: str, count: int, binding: int) -> str:
+    """GLSL: a uniform block of `count` records of struct `name`, and e.g. `Light light_at(uint index)` to read one.
+
+    The block is an array of vec4: an array of structs has thousands of members, which take drivers long to link.
+    """
+    dtype, stem = record(name), name.lower()
+    texels = dtype.itemsize // 16
+    types = {field: kind for kind, field in _FIELD.findall(_structs()[name])}
+    offsets = {field: of[1] for field, of in (dtype.fields or {}).items()}
+    members = [f"    read.{field} = {_from_texels(types[field], at, stem)};" for field, at in offsets.items()]
+    return "\n".join(
+        [
+            '#include "lib/records.glsl"',
+            f"layout(std140, binding = {binding}) uniform {name}Texels {{ vec4 {stem}_texels[{texels * count}]; }};",
+            f"{name} {stem}_at(uint index) {{",
+            f"    uint first = index * {texels}u;",
+            f"    {name} read;",
+            *members,
+            "    return read;",
+            "}",
+        ]
+    )
+
+
+def _from_texels(kind: str, offset: int, stem: str) -> str:
+    texel, first = divmod(offset // 4, 4)
+    value = f"{stem}_texels[first + {texel}u].{'xyzw'[first : first + _TYPES[kind][0].itemsize // 4]}"
+    return f"floatBitsToUint({value})" if kind.startswith("u") else value
+
+
 @cache
 def _structs() -> dict[str, str]:
     text = (SHADERS / "lib" / "records.glsl").read_text(encoding="utf-8")

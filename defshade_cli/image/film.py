@@ -49,7 +49,8 @@ class Film:
     samples: a pixel.
     origin: (x, y) of the first pixel in the display window, from its top left corner, y down.
     display: (width, height) of the display window that the camera fills; None where that is the layers' own size.
-    shown: (name, with alpha) → colour layers that a display transform has been applied to, in [0, 1], alpha straight.
+    shown: (name, with alpha) → colour layers that a display transform has been applied to, in [0, 1] or bytes, alpha
+        straight.
     manifests: of layers that hold ids: name of the layer → what each id stands for.
     metadata: further facts for the file's header and `--stats`, JSON-like values.
     """
@@ -65,7 +66,7 @@ class Film:
     origin: tuple[int, int] = (0, 0)
     display: tuple[int, int] | None = None
     manifests: dict[str, dict[int, str]] = field(default_factory=dict)
-    shown: dict[tuple[str, bool], NDArray[np.float32]] = field(default_factory=dict)
+    shown: dict[tuple[str, bool], NDArray[np.float32] | NDArray[np.uint8]] = field(default_factory=dict)
     metadata: dict[str, Any] = field(default_factory=dict)
 
     def row(self, name: str) -> Layer:

@@ -55,7 +55,7 @@ def _colors(film: Film, name: str, row: Layer, transform: DisplayTransform) -> P
     if row.unit == SCENE_UNITS and len(row.channels) == 1:
         return _ramp(_nearness(pixels)) * np.isfinite(pixels)
     shown = film.shown.get((name, True))
-    shown = picture(row, pixels, transform, alpha=True) if shown is None else shown
+    shown = picture(row, pixels, transform, alpha=True) if shown is None else np.asarray(shown, np.float32)
     if row.unit == UNIT_VECTOR:
         return shown * pixels.any(axis=-1, keepdims=True)
     return shown[..., :3] * shown[..., 3:] if shown.shape[-1] == 4 else shown

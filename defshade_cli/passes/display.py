@@ -16,6 +16,9 @@ from defshade_cli.passes.screen import Screen
 if TYPE_CHECKING:
     from defshade_cli.image.display_shader import DisplayShader, Table
 
+_BAND = 2**19
+"""Pixels shown at a time."""
+
 
 class DisplayPass:
     """Compiled for one transform."""
@@ -28,12 +31,18 @@ class DisplayPass:
         self._array = self._screen.array(self._program)
         self._tables = {table.sampler: _texture(gpu, table) for table in shader.tables}
 
-    def show(self, pixels: NDArray[np.float32], *, straight: bool) -> NDArray[np.float32]:
-        """(H, W, 3 or 4), premultiplied → the same shape in [0, 1]. straight: colours come out without their alpha."""
+    def show(
+        self, pixels: NDArray[np.float32], *, straight: bool, in_bytes: bool = False
+    ) -> NDArray[np.float32] | NDArray[np.uint8]:
+        """(H, W, 3 or 4), premultiplied → the same shape in [0, 1], or of bytes, rounded.
+
+        straight: colours come out without their alpha. A band of rows at a time, so that little memory is taken.
+        """
         self._gpu.make_current()
         height, width, channels = pixels.shape
-        target = allocate(self._gpu, (width, height), {"shown": (4, "f4")})
-        image = self._gpu.context.texture((width, height), channels, finite(pixels).tobytes(), dtype="f4")
+        rows = min(max(_BAND // width, 1), height)
+        target = allocate(self._gpu, (width, rows), {"shown": (4, "f1" if in_bytes else "f4")})
+        image = self._gpu.context.texture((width, rows), channels, dtype="f4")
         image.use(0)
         self._program["image"], self._program["straight"] = 0, straight
         for unit, (name, table) in enumerate(self._tables.items(), 1):
@@ -41,11 +50,15 @@ class DisplayPass:
             self._program[name] = unit
         target.framebuffer.use()
         self._gpu.context.enable_only(moderngl.NOTHING)
-        self._screen.draw(self._array)
-        shown = target.read("shown")[..., :channels]
+        shown = np.empty(pixels.shape, np.uint8 if in_bytes else np.float32)
+        for top in range(0, height, rows):
+            band = np.ascontiguousarray(finite(pixels[top : top + rows]))
+            image.write(band, viewport=(0, 0, width, len(band)))
+            self._screen.draw(self._array)
+            shown[top : top + rows] = target.read("shown")[: len(band), :, :channels]
         image.release()
         target.release()
-        return np.ascontiguousarray(shown)
+        return shown
 
 
 def _texture(gpu: Gpu, table: Table) -> moderngl.Texture | moderngl.Texture3D:

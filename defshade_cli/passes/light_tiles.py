@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.outputs import outputs_source
 from defshade_cli.gpu.planes import read_source
-from defshade_cli.gpu.records import record
+from defshade_cli.gpu.records import block_source, record
 from defshade_cli.gpu.residence import LIGHT_BLOCK, LIGHT_LISTS, RecordBuffer
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer
@@ -120,11 +120,12 @@ def _compile(gpu: Gpu, variant: LightingVariant, most: int) -> moderngl.Program:
     generated = {
         "generated/planes.glsl": read_source(variant.planes, variant.layout),
         "generated/outputs.glsl": outputs_source(variant.outputs, variant.groups),
+        "generated/light_block.glsl": block_source("Light", most, LIGHT_BLOCK),
     }
     far = "quad" in variant.volumes
     distances = ["VOLUME_QUAD" if variant.volumes == ("quad",) else "VOLUMES_MIXED"] * far
-    defines = [*variant.defines, *distances, f"LIGHTS_A_DRAW {most}"]
-    return gpu.shaders.program("light_tiles.vert", "lighting_tiles.frag", defines=defines, generated=generated)
+    files = ("light_tiles.vert", "lighting_tiles.frag")
+    return gpu.shaders.program(*files, defines=[*variant.defines, *distances], generated=generated)
 
 
 def light_bounds(records: NDArray, camera_from_relative: NDArray[np.float64]) -> LightBounds:

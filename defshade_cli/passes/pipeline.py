@@ -157,7 +157,8 @@ class Pipeline:
         if plan.debug == "volumes":
             beauty = laid_over(beauty, self._volumes(draws, plan, tables, gbuffer))
         layers = {"beauty": beauty, "alpha": beauty[..., 3:]} | targets.layers(counts)
-        layers |= {"variance": variance, "sampleCount": counts.astype(np.float32)}
+        if {"variance", "sampleCount"} & set(plan.layers):
+            layers |= {"variance": variance, "sampleCount": counts.astype(np.float32)}
         return layers | mattes.layers(self._accumulation.count), mattes.manifests(), sampling
 
     def _light(

@@ -32,7 +32,7 @@ class Stopping:
     def begin(self, plan: Plan) -> None:
         self._plan, self._start = plan, time.perf_counter()
         self._convergence = Convergence(plan.size, plan.max_error)
-        self._variance = np.full((plan.size[1], plan.size[0], 1), np.inf, np.float32)
+        self._variance = np.broadcast_to(np.float32(np.inf), (plan.size[1], plan.size[0], 1))
         self._stopped_by: StopReason = "samples"
         if plan.tracks_error:
             self._batches.begin(plan.size)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from defshade_cli.farm.shots import Shot
 from defshade_cli.farm.targets import shot_paths
 from defshade_cli.image.colour import display_transform
+from defshade_cli.image.encoders import is_in_bytes
 from defshade_cli.image.encoders.sink import bounded
 from defshade_cli.image.files import pictures
 from defshade_cli.image.film import Film
@@ -27,8 +28,10 @@ def shown(film: Film, shot: Shot, renderer: Renderer) -> Film:
     display = renderer.display(job.device, transform)
     if display is None:
         return film
+    in_bytes = all(is_in_bytes(path, job.output) for path in shot_paths(shot))
     images = {}
     for name, alpha in wanted:
         pixels = bounded(name, film.layers[name], half=True)
-        images[name, alpha] = display.show(pixels if alpha else pixels[..., :3], straight=alpha)
+        colors = pixels if alpha else pixels[..., :3]
+        images[name, alpha] = display.show(colors, straight=alpha, in_bytes=in_bytes)
     return replace(film, shown=images)

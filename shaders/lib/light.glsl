@@ -1,11 +1,7 @@
 #include "lib/records.glsl"
 #include "lib/constants.glsl"
 
-#ifdef LIGHTS_A_DRAW
-layout(std140, binding = 0) uniform LightBlock { Light lights[LIGHTS_A_DRAW]; };
-#else
 layout(std430, binding = 3) readonly buffer LightBlock { Light lights[]; };
-#endif
 
 const uint PROFILE_UNIFORM = 0u;
 const uint PROFILE_COSINE = 1u;

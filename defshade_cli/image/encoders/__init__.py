@@ -6,11 +6,11 @@ from pathlib import Path
 
 from defshade_cli.errors import UsageError
 from defshade_cli.image.encoders.exr import write_exr
-from defshade_cli.image.encoders.pictures import PICTURES, write_picture, write_sheet
+from defshade_cli.image.encoders.pictures import PICTURES, bits_of, write_picture, write_sheet
 from defshade_cli.image.film import Film
 from defshade_cli.settings import OutputSettings
 
-__all__ = ["EXR", "PICTURES", "SUFFIXES", "check_format", "encode", "suffix_of"]
+__all__ = ["EXR", "PICTURES", "SUFFIXES", "check_format", "encode", "is_in_bytes", "suffix_of"]
 
 EXR = ".exr"
 SUFFIXES = (EXR, *PICTURES)
@@ -30,6 +30,13 @@ def check_format(path: Path, output: OutputSettings) -> None:
     if suffix != EXR and output.bits and output.bits not in PICTURES[suffix].bits:
         depths = " or ".join(map(str, PICTURES[suffix].bits))
         raise UsageError(f"'{path}': the format has {depths} bits a channel, not {output.bits}")
+
+
+def is_in_bytes(path: Path, output: OutputSettings) -> bool:
+    """Are colours that `path` shows, as EXR does not, stored in 8 bits a channel just as they are?"""
+    if suffix_of(path) == EXR:
+        return True
+    return bits_of(path, output) == 8 and not (output.dither or output.sheet)
 
 
 def encode(film: Film, names: tuple[str, ...], output: OutputSettings, path: Path) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
+from numpy.typing import NDArray
 
 from defshade_cli.image.colour import Pixels, display_transform, picture
 from defshade_cli.image.encoders.sink import bounded, make_spec, opened, set_attributes
@@ -20,6 +21,10 @@ from defshade_cli.settings import OutputSettings
 Hint = tuple[str, str | int]
 
 _DITHER_SEED = 1  # equal films, equal files
+
+
+_UP = 0x20
+"""libpng's PNG_FILTER_UP: one filter for all rows takes half the time of trying each, for files as small."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +46,7 @@ _TIFF = PictureFormat((16, 8), hints=(("compression", "zip"), ("Exif:ColorSpace"
 """Uncalibrated, unless the display is sRGB: an Exif block without any entry is reported as a failure."""
 
 PICTURES = {
-    ".png": PictureFormat((8, 16), hints=(("png:compressionLevel", 1),)),
+    ".png": PictureFormat((8, 16), hints=(("png:compressionLevel", 1), ("png:filter", _UP))),
     ".jpg": _JPEG,
     ".jpeg": _JPEG,
     ".jxl": PictureFormat((8, 16), hints=(("compression", "jpegxl:100"),)),
@@ -62,7 +67,7 @@ def write_picture(film: Film, name: str, output: OutputSettings, path: Path) -> 
     shown = film.shown.get((name, form.alpha))
     if shown is None:
         shown = picture(layer, pixels, transform, alpha=form.alpha)
-    bits = output.bits or form.bits[0]
+    bits = bits_of(path, output)
     spec = make_spec(film, shown.shape[-1], f"uint{bits}")
     if layer.is_color:
         spec.set_colorspace(transform.encoding)
@@ -74,14 +79,21 @@ def write_sheet(film: Film, names: tuple[str, ...], output: OutputSettings, path
     transform = display_transform(output.display, output.view, output.look, film.render_space)
     sheet = contact_sheet(film, names, transform)
     height, width = sheet.shape[:2]
-    _write(sheet, oiio.ImageSpec(width, height, 3, f"uint{output.bits or _format(path).bits[0]}"), film, path)
+    _write(sheet, oiio.ImageSpec(width, height, 3, f"uint{bits_of(path, output)}"), film, path)
+
+
+def bits_of(path: Path, output: OutputSettings) -> int:
+    """A channel of the picture: those asked for, or the format's default."""
+    return output.bits or _format(path).bits[0]
 
 
 def _format(path: Path) -> PictureFormat:
     return PICTURES[path.suffix.lower()]
 
 
-def _write(shown: Pixels, spec: oiio.ImageSpec, film: Film, path: Path, *, dithered: bool = False) -> None:
+def _write(
+    shown: Pixels | NDArray[np.uint8], spec: oiio.ImageSpec, film: Film, path: Path, *, dithered: bool = False
+) -> None:
     form = _format(path)
     for hint, value in (*form.hints, *_hints(dithered=dithered)):
         spec.attribute(hint, value)
