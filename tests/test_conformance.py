@@ -188,7 +188,7 @@ def pipeline(gpu: Gpu) -> Pipeline:
     ("name", "keys"),
     [
         ("ousd_camera_a", ("00", "04")),
-        ("ousd_geometry_a", ("00", "02", "04", "07", "14")),
+        ("ousd_geometry_a", ("00", "02", "04", "07", "08", "09", "10", "12", "13", "14")),
         ("ousd_instancing_a", ("00", "01", "03")),
         ("ousd_point_instancer_a", ("01", "02", "04", "06")),
         ("ousd_preview_surface_a", ("03", "06")),
@@ -200,7 +200,7 @@ def pipeline(gpu: Gpu) -> Pipeline:
     ],
 )
 def test_silhouettes_agree(assets: Path, pipeline: Pipeline, name: str, keys: tuple[str, ...]) -> None:
-    """Solids, cameras, clipping, purposes, instances, skins, holes, framing: each against Storm's own picture."""
+    """Solids, points, curves, holes, skins, instances, cameras, clipping, purposes, framing: against Storm."""
     cases = [case for case in read_item(assets / name) if case.key.rpartition("-")[2] in keys]
     found = {case.key: draw(case, pipeline).iou for case in cases}
     assert len(found) == len(keys)

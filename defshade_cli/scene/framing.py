@@ -57,6 +57,21 @@ class Framing:
         return 0.0 if self.turn is None or frame is None else 360.0 * (frame - 1.0) / self.turn
 
 
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A camera that is given, whatever is in view."""
+
+    held: Camera
+    turn: int | None = None
+
+    @property
+    def name(self) -> str:
+        return "held"
+
+    def camera(self, bounds: NDArray[np.float64], up_axis: str, window: Window, frame: float | None) -> Camera:
+        return self.held
+
+
 def world_from_front(up_axis: str) -> Matrix:
     """(4, 4) the world seen from its front: +X right, +Y up, +Z towards the eye."""
     return _Z_UP_FROM_FRONT if up_axis == "Z" else np.eye(4)

@@ -6,8 +6,8 @@ after its last, 2 P₀ − P₁ and 2 Pₙ₋₁ − Pₙ₋₂.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,32 +97,72 @@ def sample_curves(kind: Kind, counts: NDArray[np.int64], points: int, detail: in
     curve = np.repeat(np.arange(len(counts)), rows)
     place = np.arange(len(curve)) - np.repeat(np.cumsum(rows) - rows, rows)
     segment = np.minimum(place // detail, segments[curve] - 1)
-    t = (place - segment * detail) / detail
+    return sample_at(kind, counts, points, Places(curve, segment, (place - segment * detail) / detail))
+
+
+class Places(NamedTuple):
+    """(S,) places along curves: the curve, its segment, and how far along that, 0..1."""
+
+    curve: NDArray[np.intp]
+    segment: NDArray[np.intp]
+    t: NDArray[np.float64]
+
+
+def sample_at(kind: Kind, counts: NDArray[np.int64], points: int, places: Places) -> CurveSamples:
+    segments = kind.segments(counts)
     varying_counts = segments + (0 if kind.closed else 1)
     elements = {"constant": 1, "uniform": len(counts), "vertex": points}
     varying = int(varying_counts.sum())
     return CurveSamples(
-        curve,
+        places.curve,
         kind.closed,
-        _vertex_weights(kind, counts, points, curve, segment, t),
-        _varying_weights(kind, varying_counts, curve, segment, t),
+        _vertex_weights(kind, counts, points, places, _powers(kind, places.t) @ _BASES[kind.basis][1].T),
+        _varying_weights(kind, varying_counts, places),
         elements | {"varying": varying, "faceVarying": varying},
         int(np.count_nonzero(segments == 0)),
     )
 
 
+def control_samples(kind: Kind, counts: NDArray[np.int64], points: int, closed: bool) -> CurveSamples:
+    """A sample at every control point, as if the curves were lines between these, closed ones or open."""
+    segments = kind.segments(counts)
+    rows = np.where(segments > 0, counts, 0)
+    curve = np.repeat(np.arange(len(counts)), rows)
+    place = np.arange(len(curve)) - np.repeat(np.cumsum(rows) - rows, rows)
+    along = place * segments[curve] / np.maximum(counts - (0 if kind.closed else 1), 1)[curve]
+    segment = np.minimum(along.astype(np.intp), segments[curve] - 1)
+    samples = sample_at(kind, counts, points, Places(curve, segment, along - segment))
+    own = (np.cumsum(counts) - counts)[curve] + place
+    vertex = _sparse(np.ones(len(own)), np.arange(len(own)), own, (len(own), points))
+    return replace(samples, vertex=vertex, closed=closed)
+
+
+def tangent_weights(kind: Kind, counts: NDArray[np.int64], points: int, places: Places) -> Weights:
+    """(S, points) of the derivative along t."""
+    size = len(_BASES[kind.basis][1])
+    slopes = np.arange(size) * _powers(kind, places.t)[:, [0, *range(size - 1)]]
+    return _vertex_weights(kind, counts, points, places, slopes @ _BASES[kind.basis][1].T)
+
+
+def control_weights(kind: Kind, counts: NDArray[np.int64], points: int, places: Places) -> tuple[Weights, ...]:
+    """(S, points) each: the control points of the segments, one after the other."""
+    choices = np.eye(len(_BASES[kind.basis][1]))
+    repeated = (np.broadcast_to(choice, (len(places.t), len(choice))) for choice in choices)
+    return tuple(_vertex_weights(kind, counts, points, places, weights) for weights in repeated)
+
+
+def _powers(kind: Kind, t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(S, 2 or 4) 1, t, t², t³"""
+    return t[:, None] ** np.arange(len(_BASES[kind.basis][1]))
+
+
 def _vertex_weights(
-    kind: Kind,
-    counts: NDArray[np.int64],
-    points: int,
-    curve: NDArray[np.intp],
-    segment: NDArray[np.int64],
-    t: NDArray[np.float64],
+    kind: Kind, counts: NDArray[np.int64], points: int, places: Places, weights: NDArray[np.float64]
 ) -> Weights:
-    """(S, points)"""
+    """(S, points) what `weights` (S, 2 or 4) of the control points of their segments are of all points."""
+    curve, segment, _ = places
     step, basis = _BASES[kind.basis]
     size = len(basis)
-    weights = (t[:, None] ** np.arange(size)) @ basis.T
     own = segment[:, None] * step + np.arange(size) - kind.pinned
     if kind.closed:
         own %= counts[curve, None]
@@ -147,14 +187,9 @@ def _with_phantoms(first: NDArray[np.int64], counts: NDArray[np.int64], points: 
     return _sparse(weight, row, column, (points + 2 * len(counts), points))
 
 
-def _varying_weights(
-    kind: Kind,
-    varying_counts: NDArray[np.int64],
-    curve: NDArray[np.intp],
-    segment: NDArray[np.int64],
-    t: NDArray[np.float64],
-) -> Weights:
+def _varying_weights(kind: Kind, varying_counts: NDArray[np.int64], places: Places) -> Weights:
     """(S, varying values) linear from one end of a segment to the other."""
+    curve, segment, t = places
     first = (np.cumsum(varying_counts) - varying_counts)[curve]
     following = (segment + 1) % varying_counts[curve] if kind.closed else segment + 1
     row = np.tile(np.arange(len(curve)), 2)

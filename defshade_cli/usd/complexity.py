@@ -11,15 +11,14 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.geometry import world_boxes
 from defshade_cli.settings import Complexity
 from defshade_cli.usd.geometry import Surface
+from defshade_cli.usd.view import View
 
 UNIFORM_LEVELS: dict[Complexity, int] = {"low": 0, "medium": 1, "high": 2, "veryhigh": 3}
 """Levels everywhere, as usdrecord's complexities 1.0, 1.1, 1.2 and 1.3."""
@@ -29,24 +28,6 @@ FLAT_PIXELS = 0.1
 FINEST_LEVEL = 5
 TRIANGLE_BUDGET = 2_000_000
 """Of all subdivision surfaces together, each counted once however often it is placed."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class View:
-    """What a pixel is. camera: conformed to the image.  height: of the image, pixels."""
-
-    camera: Camera
-    height: int
-
-    def pixels_per_unit(self, boxes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(N,) how large a unit may appear in world-space boxes (N, 2, 3): at their points nearest to the eye."""
-        _, _, bottom, top = self.camera.window
-        scale = self.height / (top - bottom)
-        if self.camera.projection == "orthographic":
-            return np.full(len(boxes), scale)
-        eye = self.camera.position
-        apart = np.maximum(np.maximum(boxes[:, 0] - eye, eye - boxes[:, 1]), 0.0)
-        return scale / np.maximum(np.linalg.norm(apart, axis=1), self.camera.clipping_range[0])
 
 
 def choose_levels(

@@ -17,6 +17,7 @@ from defshade_cli.usd.points import read_widths
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.positions import read_positions
 from defshade_cli.usd.primvars import DISPLAY_COLOR, Authored, authored, fit, read_carried
+from defshade_cli.usd.strands import Strands, laid_along
 from defshade_cli.usd.tubes import ribbons, tubes
 from defshade_cli.usd.values import integers
 
@@ -32,8 +33,11 @@ _DETAILS = ((LARGEST_DETAIL, 12), (4, 6), (2, 3))
 
 def read_curves(
     curves: UsdGeom.BasisCurves, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR
-) -> Polygons:
-    """All curves of the prim, each a face in the sense of `Polygons.faces`. Bad data becomes issues."""
+) -> tuple[Polygons, Strands]:
+    """All curves of the prim, each a face in the sense of `Polygons.faces`, and before they are sampled.
+
+    Bad data becomes issues.
+    """
     points = read_positions(curves.GetPrim(), time)
     counts = integers(curves.GetCurveVertexCountsAttr().Get(time) or [])
     points = np.empty((0, 3), np.float32) if points is None else points
@@ -41,11 +45,17 @@ def read_curves(
     if not np.isfinite(points).all():
         issues.append("it is left out: not all of its points are finite")
         counts = counts[:0]
-    kind = _closable(_kind(curves), counts, issues)
+    as_authored = _kind(curves)
+    kind = _closable(as_authored, counts, issues)
     samples, sides = _detailed(kind, counts, len(points))
     if samples.left_out:
         issues.append(f"{samples.left_out} curves are left out: they have too few points, or cannot be closed")
-    return _build(curves, samples, points, sides, time, issues, color)
+    prim = curves.GetPrim()
+    widths = read_widths(prim, time, samples.elements, issues)
+    normals = fit(_normals(curves, time), 3, samples.elements, issues)
+    carried = read_carried(prim, time, samples.elements, issues, color)
+    strands = Strands(kind, counts, points, widths, carried, normals is not None, as_authored.closed)
+    return _swept(strands, samples, normals, sides), strands
 
 
 def _complete(counts: NDArray[np.integer], available: int, issues: list[str]) -> NDArray[np.int64]:
@@ -82,34 +92,17 @@ def _detailed(kind: Kind, counts: NDArray[np.int64], points: int) -> tuple[Curve
     return samples, sides
 
 
-def _build(
-    curves: UsdGeom.BasisCurves,
-    samples: CurveSamples,
-    points: NDArray[np.float32],
-    sides: int,
-    time: Usd.TimeCode,
-    issues: list[str],
-    color: str,
-) -> Polygons:
-    prim = curves.GetPrim()
-
-    centres = samples.vertex @ points.astype(np.float64)
-    radii = samples.at(read_widths(prim, time, samples.elements, issues)) / 2.0
-    authored_normals = fit(_normals(curves, time), 3, samples.elements, issues)
-    normals = None if authored_normals is None else samples.at(authored_normals)
-    shape = tubes(samples, centres, radii, sides) if normals is None else ribbons(samples, centres, radii, normals)
-    shape = read_carried(prim, time, samples.elements, issues, color).laid_on(shape)
+def _swept(strands: Strands, samples: CurveSamples, normals: Primvar | None, sides: int) -> Polygons:
+    centres = samples.vertex @ strands.points.astype(np.float64)
+    radii = samples.at(strands.widths) / 2.0
+    if normals is None:
+        shape = tubes(samples, centres, radii, sides)
+    else:
+        shape = ribbons(samples, centres, radii, samples.at(normals))
     around = len(shape.points) // max(samples.count, 1)
-    return shape.with_primvars(lambda p: p if p is shape.normals else _around(p, samples, around))
+    return laid_along(shape, strands.carried, samples, np.repeat(np.arange(samples.count), around))
 
 
 def _normals(curves: UsdGeom.BasisCurves, time: Usd.TimeCode) -> Authored | None:
     primvar = authored(UsdGeom.PrimvarsAPI(curves).GetPrimvar("normals"), time)
     return primvar or Authored("normals", curves.GetNormalsAttr().Get(time), curves.GetNormalsInterpolation())
-
-
-def _around(primvar: Primvar, samples: CurveSamples, around: int) -> Primvar:
-    """A primvar of the curves on the points of their polygons, `around` of them a sample."""
-    if primvar.interpolation == "constant":
-        return primvar
-    return Primvar(np.repeat(samples.at(primvar), around, axis=0).astype(np.float32), "vertex")

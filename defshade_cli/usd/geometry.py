@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,7 @@ from defshade_cli.usd.said import Said, said_of
 from defshade_cli.usd.shapes import Shapes
 from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.small_meshes import Shaped
+from defshade_cli.usd.strands import Strands
 from defshade_cli.usd.subsets import FaceGroup, Faces, material_subsets, read_faces
 
 __all__ = ["FaceGroup", "Gprim", "Surface", "is_time_varying", "read_surface", "tessellate"]
@@ -58,6 +60,7 @@ class Surface:
         varies and lies on the polygons. display_opacity likewise.
     groups: paths of the material groups that have faces to draw, in order.
     issues: what was left out or mended of this prim, and why.
+    strands: of curves that may face the image, which then counts in place of the polygons.
     """
 
     path: str
@@ -70,6 +73,7 @@ class Surface:
     display_color: NDArray[np.float32] | None
     display_opacity: float | None
     issues: tuple[Unsupported, ...]
+    strands: Strands | None = None
 
     @property
     def mean_edge(self) -> float:
@@ -111,13 +115,13 @@ def read_surface(
 
     A surface of which nothing can be drawn has no groups, and issues that say why.
     color: primvar to take for displayColor.  shown: primvars for layers.
-    shapes: of other prims, whose polygons it shares where they are equal.  as_cages: see gprims.read_solid.
+    shapes: of other prims, whose polygons it shares where they are equal.  as_cages: see Memory.
     said, subsets: of the prim, where they are known, see subsets.material_subsets.
     """
     issues: list[str] = []
     path = str(prim.GetPath())
     said = said or said_of(prim)
-    polygons, copies = _read_shape(prim, said, time, issues, color, as_cages)
+    polygons, copies, strands = _read_shape(prim, said, time, issues, color, as_cages)
     if polygons is None:
         return None
     if shown:
@@ -139,6 +143,7 @@ def read_surface(
         display_color=display_color,
         display_opacity=None if opacity is None else float(opacity),
         issues=tuple(Unsupported(path, issue) for issue in issues),
+        strands=strands,
     )
 
 
@@ -217,21 +222,30 @@ def _carried(prim: Usd.Prim, color: str, shown: tuple[str, ...]) -> Iterator[Usd
     yield from (p for name, p in found if name in (color, "displayOpacity") or may_be_uvs(p))
 
 
+class _Shape(NamedTuple):
+    """polygons: None for a type that is no supported surface.  copies, strands: as in Surface."""
+
+    polygons: Polygons | None = None
+    copies: Copies | None = None
+    strands: Strands | None = None
+
+
 def _read_shape(
     prim: Usd.Prim, said: Said, time: Usd.TimeCode, issues: list[str], color: str, as_cages: bool
-) -> tuple[Polygons | None, Copies | None]:
+) -> _Shape:
     solid = read_solid(prim, said, time, issues, color, as_cage=as_cages)
     if solid is not None:
-        return solid, None
+        return _Shape(solid)
     if prim.IsA(UsdGeom.Mesh):
-        return read_mesh(UsdGeom.Mesh(prim), said, time, issues, color), None
+        return _Shape(read_mesh(UsdGeom.Mesh(prim), said, time, issues, color))
     if prim.IsA(UsdGeom.Points):
-        return read_points(UsdGeom.Points(prim), time, issues, color)
+        return _Shape(*read_points(UsdGeom.Points(prim), time, issues, color, as_disks=as_cages))
     if prim.IsA(UsdGeom.BasisCurves):
-        return read_curves(UsdGeom.BasisCurves(prim), time, issues, color), None
+        polygons, strands = read_curves(UsdGeom.BasisCurves(prim), time, issues, color)
+        return _Shape(polygons, strands=strands if as_cages else None)
     if prim.IsA(UsdGeom.NurbsPatch):
-        return read_patch(UsdGeom.NurbsPatch(prim), time, issues, color), None
-    return None, None
+        return _Shape(read_patch(UsdGeom.NurbsPatch(prim), time, issues, color))
+    return _Shape()
 
 
 def _is_double_sided(prim: Usd.Prim, said: Said) -> bool:

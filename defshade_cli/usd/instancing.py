@@ -123,7 +123,7 @@ def finite(pieces: Sequence[Piece]) -> tuple[tuple[Piece, ...], tuple[str, ...]]
     if not pieces or np.isfinite(np.concatenate([piece.root_from_object for piece in pieces])).all():
         return tuple(pieces), ()
     masks: list[NDArray[np.bool_]] = [np.all(np.isfinite(piece.root_from_object), axis=(1, 2)) for piece in pieces]
-    kept = [_some(piece, mask) if not mask.all() else piece for piece, mask in zip(pieces, masks, strict=True)]
+    kept = [some(piece, mask) if not mask.all() else piece for piece, mask in zip(pieces, masks, strict=True)]
     lost = (path for piece, mask in zip(pieces, masks, strict=True) for path in _paths_where(piece, ~mask))
     return tuple(piece for piece in kept if len(piece.ids)), tuple(dict.fromkeys(lost))
 
@@ -169,7 +169,8 @@ def _paths(piece: Piece, placement: Placement) -> tuple[str, ...]:
     return tuple(chain.from_iterable(chain.from_iterable(repeat(names, repeats) for names in copies)))
 
 
-def _some(piece: Piece, mask: NDArray[np.bool_]) -> Piece:
+def some(piece: Piece, mask: NDArray[np.bool_]) -> Piece:
+    """Those of its N for which `mask` (N,) holds."""
     return replace(
         piece,
         root_from_object=piece.root_from_object[mask],

@@ -25,7 +25,8 @@ from defshade_cli.usd.subsets import material_subsets
 class Memory:
     """The unchanging parts of one stage, and the names of what stands in its prototypes.
 
-    as_cages: see gprims.read_solid.  kinds: of prims.  rigs: what skeletons deform.
+    as_cages: what is round is what Hydra draws of it: see gprims.read_solid, and facing.
+    kinds: of prims.  rigs: what skeletons deform.
     xforms: USD's cache, which drops only what varies when its time is set.
     """
 

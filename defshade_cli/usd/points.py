@@ -1,4 +1,4 @@
-"""UsdGeom.Points as spheres: one that is placed at every point."""
+"""UsdGeom.Points as spheres, or disks that are turned to the image: one that is placed at every point."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from defshade_cli.usd.gprims import sphere
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.positions import read_positions
 from defshade_cli.usd.primvars import DISPLAY_COLOR, Authored, Elements, authored, count_elements, fit, read_display
+from defshade_cli.usd.revolution import disk, revolve
 from defshade_cli.usd.values import floats
 
 POINTS_ATTRIBUTES = ("points", "widths", "ids")
@@ -27,9 +28,9 @@ _FEWEST_SEGMENTS = 8
 
 
 def read_points(
-    points: UsdGeom.Points, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR
+    points: UsdGeom.Points, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR, *, as_disks: bool
 ) -> tuple[Polygons, Copies]:
-    """A sphere of diameter 1, and the points that it is placed at: all that are finite."""
+    """A sphere or a disk of diameter 1, and the points that it is placed at: all that are finite."""
     positions = read_positions(points.GetPrim(), time)
     if positions is None or not len(positions):
         issues.append("it has no points")
@@ -37,7 +38,8 @@ def read_points(
     if points.GetNormalsAttr().HasAuthoredValue():
         issues.append("normals of points are ignored: spheres are drawn")
     copies = _copies(points, positions, time, issues, color)
-    return sphere(0.5, _segments(len(copies.ids))), copies
+    segments = _segments(len(copies.ids))
+    return revolve([disk(0.5, 0.0, 1)], 2 * segments) if as_disks else sphere(0.5, segments), copies
 
 
 def read_widths(prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> Primvar:

@@ -16,7 +16,7 @@ from pxr import Usd
 from defshade_cli.errors import EmptyStage
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
-from defshade_cli.scene.framing import Framing
+from defshade_cli.scene.framing import Framing, Held
 from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import Material
@@ -27,9 +27,9 @@ from defshade_cli.settings import Complexity
 from defshade_cli.spaces import Window, conform_window
 from defshade_cli.usd import stage as facts
 from defshade_cli.usd.camera import choose_camera, default_window, find_cameras, framed_camera, read_camera
-from defshade_cli.usd.complexity import View, choose_levels
-from defshade_cli.usd.copies import rounded
+from defshade_cli.usd.complexity import UNIFORM_LEVELS, choose_levels
 from defshade_cli.usd.extent import extent_of
+from defshade_cli.usd.facing import PlacedSurface, faced
 from defshade_cli.usd.geometry import Gprim, Surface
 from defshade_cli.usd.identity import read_assets, read_labels
 from defshade_cli.usd.instancing import Piece
@@ -44,10 +44,10 @@ from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.tessellation import Tessellation
 from defshade_cli.usd.traversal import Traversal
 from defshade_cli.usd.unresolved import find_unresolved
+from defshade_cli.usd.view import View
 
 log = logging.getLogger("defshade")
 
-PlacedSurface = tuple[Piece, Surface]
 Glowing = tuple[Glow, tuple[Light, ...]]
 
 
@@ -76,7 +76,7 @@ class StageReader:
         complexity: Complexity = "auto",
         size: tuple[int, int] | None = None,
         width: int | None = None,
-        framing: Framing | None = None,
+        framing: Framing | Held | None = None,
         studio: bool = False,
         extras: Extras = NO_EXTRAS,
         beside: StageReader | None = None,
@@ -148,7 +148,9 @@ class StageReader:
         if not drawn and not traversal.dormant:
             raise EmptyStage(_empty(self._stage, traversal.issues))
         camera, camera_issues = self._read_camera(frame, time, placed)
-        gprims = self._tessellate(drawn, camera, levels)
+        view = self._view(camera)
+        drawn = tuple(faced(drawn, view, UNIFORM_LEVELS.get(self._complexity)))
+        gprims = self._tessellate(drawn, view, levels)
         palette = Palette(self._memory, time, self._settings.material_purposes)
         meshes: dict[Mesh, int] = {}
         glowing = _glowing(drawn, gprims, traversal.glows, palette)
@@ -239,12 +241,12 @@ class StageReader:
         lights = studio_lights(scene) if self._studio else (camera_light(scene.camera),)
         return replace(scene, lights=lights, lit_by="studio" if self._studio else "camera light")
 
-    def _tessellate(
-        self, drawn: Iterable[PlacedSurface], camera: Camera, levels: dict[str, int]
-    ) -> dict[Surface, Gprim]:
+    def _view(self, camera: Camera) -> View:
         width, height = image_size(camera.aspect, self._size, self._width, self._settings.resolution)
         aspect = width * self._settings.pixel_aspect_for(camera) / height
-        view = View(camera.conformed(aspect, self._settings.conform), height)
+        return View(camera.conformed(aspect, self._settings.conform), height)
+
+    def _tessellate(self, drawn: Iterable[PlacedSurface], view: View, levels: dict[str, int]) -> dict[Surface, Gprim]:
         placed = ((surface, piece.root_from_object) for piece, surface in drawn)
         chosen = choose_levels(placed, self._complexity, view)
         return self._tessellation.at_levels(
@@ -291,7 +293,7 @@ def _drawable(mesh: int, subsets: tuple[Subset, ...], pieces: Sequence[Piece], u
     color, opacity = _joined([p.display_color for p in pieces]), _joined([p.display_opacity for p in pieces])
     return Drawable(
         mesh=mesh,
-        world_from_object=_joined([_world_from_object(piece) for piece in pieces]),
+        world_from_object=_joined([piece.root_from_object for piece in pieces]),
         subsets=subsets,
         paths=tuple(path for piece in pieces for path in piece.paths),
         instance_ids=_joined([piece.ids for piece in pieces]),
@@ -302,11 +304,6 @@ def _drawable(mesh: int, subsets: tuple[Subset, ...], pieces: Sequence[Piece], u
 
 def _joined(arrays: Sequence[NDArray]) -> NDArray:
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
-
-
-def _world_from_object(piece: Piece) -> NDArray[np.float64]:
-    is_point = isinstance(piece.content, Surface) and piece.content.copies is not None
-    return rounded(piece.root_from_object) if is_point else piece.root_from_object
 
 
 def _paths(drawables: Iterable[Drawable]) -> dict[str, None]:

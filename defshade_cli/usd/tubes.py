@@ -66,9 +66,9 @@ def _strips(
 ) -> Polygons:
     """Quads from each sample to the next, between points `left` and `right` of points (S, K, 3)."""
     around = points.shape[1]
-    following = _following(samples)
-    here = np.flatnonzero(following >= 0)
-    there = following[here]
+    after = following(samples)
+    here = np.flatnonzero(after >= 0)
+    there = after[here]
     corners = np.stack(
         [
             here[:, None] * around + left,
@@ -87,7 +87,7 @@ def _strips(
     )
 
 
-def _following(samples: CurveSamples) -> NDArray[np.intp]:
+def following(samples: CurveSamples) -> NDArray[np.intp]:
     """(S,) the sample after each; −1 at the end of an open curve."""
     following = np.arange(1, samples.count + 1)
     first, last = _ends(samples)
@@ -103,8 +103,8 @@ def _ends(samples: CurveSamples) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 def _course(samples: CurveSamples, centres: Vectors) -> _Course:
     """From the sample before to the one after; along the Z axis where a curve stands still."""
-    following = _following(samples)
-    after = np.where(following >= 0, following, np.arange(samples.count))
+    after = following(samples)
+    after = np.where(after >= 0, after, np.arange(samples.count))
     before = np.arange(-1, samples.count - 1)
     first, last = _ends(samples)
     before[first] = last if samples.closed else first

@@ -97,8 +97,8 @@ def _shading_options() -> list[Function]:
             default=_RENDER.complexity,
             default_text=str(_RENDER.complexity),
             help="Refinement of subdivision surfaces: auto goes by their size in the image; low draws their cages, "
-            "medium, high and veryhigh one, two and three levels. All but auto make solids of ten segments, as "
-            "usdrecord does.",
+            "medium, high and veryhigh one, two and three levels. All but auto draw solids, points and curves as "
+            "usdrecord does: of ten segments, as disks, and as lines or ribbons.",
         ),
         option(
             "--light-tolerance",

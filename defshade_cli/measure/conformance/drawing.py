@@ -27,6 +27,7 @@ from defshade_cli.measure.conformance.silhouette import (
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan, plan_moments
 from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.framing import Held
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderSettings
 from defshade_cli.usd.extent import stage_extent
@@ -71,7 +72,7 @@ def draw(case: Case, pipeline: Pipeline) -> Drawn:
     size = _size(case, reference)
     stage = _stage(case)
     reader = _reader(case, stage, size)
-    scene = _scene(case, stage, reader)
+    scene = _scene(case, stage, reader, size)
     read_at = time.perf_counter()
     settings = RenderSettings(size=size, shadows=case.maker != "storm", background=_shows_sky(case, reference))
     pixels, alpha = _render(case, pipeline, scene, reader, settings)
@@ -103,21 +104,27 @@ def _stage(case: Case) -> Any:
     return stage
 
 
-def _reader(case: Case, stage: Any, size: tuple[int, int]) -> StageReader:
+def _reader(case: Case, stage: Any, size: tuple[int, int], **seen: Any) -> StageReader:
+    """seen: in place of the camera that the conditions name."""
     conditions = case.conditions
     return StageReader(
         stage,
-        camera=conditions.camera,
         purposes=conditions.purposes,
         complexity=conditions.complexity,
         size=size,
+        **(seen or {"camera": conditions.camera}),
     )
 
 
-def _scene(case: Case, stage: Any, reader: StageReader) -> Scene:
+def _scene(case: Case, stage: Any, reader: StageReader, size: tuple[int, int]) -> Scene:
+    """With the reference's camera, and what faces it."""
     conditions = case.conditions
     frame = reader.first_frame() if conditions.frame == "first" else conditions.frame
-    return under(conditions, reader.read(frame), stage_extent(stage, conditions.purposes))
+    scene = under(conditions, reader.read(frame), stage_extent(stage, conditions.purposes))
+    if conditions.background is None:
+        return scene
+    seen = _reader(case, stage, size, framing=Held(scene.camera), beside=reader).read(frame)
+    return replace(scene, meshes=seen.meshes, drawables=seen.drawables)
 
 
 def _size(case: Case, reference: Picture | None) -> tuple[int, int]:

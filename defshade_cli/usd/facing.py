@@ -1,0 +1,69 @@
+"""Points and curves where the camera is known, which at a fixed complexity face it, as Hydra draws them.
+
+auto     points are spheres, round under any transform, and curves are tubes
+fixed    points are disks across the view, of their width as it is seen where they stand; curves see usd/strands.py
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.spaces import transform_points
+from defshade_cli.usd.copies import rounded
+from defshade_cli.usd.geometry import Surface
+from defshade_cli.usd.instancing import Piece, some
+from defshade_cli.usd.view import View
+
+PlacedSurface = tuple[Piece, Surface]
+
+_SMALL, _ENLARGED = 16.0, 0.0825
+"""Points of fewer pixels are enlarged by this part of what they lack, so that none vanishes: pointDisk.glslfx."""
+
+_WIDEST = 100.0
+"""Pixels: HD_GL_POINT_SIZE_MAX of renderPass.glslfx."""
+
+
+def faced(placed: Iterable[PlacedSurface], view: View, level: int | None) -> Iterator[PlacedSurface]:
+    """The surfaces as `view` has them at a level of refinement, None for what they are from all sides."""
+    for piece, surface in placed:
+        if surface.copies is not None:
+            spheres = replace(piece, root_from_object=rounded(piece.root_from_object))
+            shown = spheres if level is None else _disks(spheres, view)
+            if len(shown.ids):
+                yield shown, surface
+        elif level is not None and surface.strands is not None and surface.strands.face_at(level):
+            yield from _strips(piece, surface, view, level)
+        else:
+            yield piece, surface
+
+
+def _disks(spheres: Piece, view: View) -> Piece:
+    """Turned to the image, a pixel narrower than they are, as GL draws round points; clipped by their centres."""
+    camera = view.camera
+    centres = transform_points(camera.camera_from_world, spheres.root_from_object[:, :3, 3])
+    planes = camera.clipping_planes
+    kept: NDArray[np.bool_] = np.all(centres @ planes[:, :3].T + planes[:, 3] >= 0.0, axis=1)
+    disks, density = some(spheres, kept), view.pixels_at(-centres[kept, 2])
+    pixels = disks.root_from_object[:, 0, 0] * density
+    drawn = np.minimum(pixels + _ENLARGED * np.maximum(_SMALL - pixels, 0.0), _WIDEST) - 1.0
+    turned = disks.root_from_object.copy()
+    turned[:, :3, :3] = np.where(pixels > 0.0, drawn / density, 0.0)[:, None, None] * camera.world_from_camera[:3, :3]
+    return replace(disks, root_from_object=turned)
+
+
+def _strips(piece: Piece, surface: Surface, view: View, level: int) -> Iterator[PlacedSurface]:
+    """Each instance of curves by itself: it is seen from where no other is."""
+    assert surface.strands is not None
+    camera = view.camera
+    for number, world_from_object in enumerate(piece.root_from_object):
+        strips = surface.strands.facing(camera.camera_from_world @ world_from_object, view, level)
+        shown = {
+            name: primvar for name, primvar in surface.polygons.shown.items() if primvar.interpolation == "constant"
+        }
+        faced = replace(surface, polygons=replace(strips.without_constants(), shown=shown), strands=None)
+        alone = some(piece, np.arange(len(piece.ids)) == number)
+        yield replace(alone, content=faced, root_from_object=camera.world_from_camera[None]), faced
