@@ -64,13 +64,12 @@ class DrawList:
     """All opaque geometry as one multi-draw.
 
     vertices: (buffer, format, attribute names) triples as moderngl takes them; indices: 32-bit.
-    commands: the indirect buffer, one draw a subset, instanced; table: the same as (C,) records.
+    table: (C,) indirect commands, one draw a subset, instanced.
     corners: (C, 8, 3) of a box around what each command draws, relative to the eye; not finite where nothing is known.
     """
 
     vertices: tuple[tuple, ...]
     indices: moderngl.Buffer
-    commands: moderngl.Buffer
     table: NDArray
     corners: NDArray[np.float64]
     color_varies: bool
@@ -134,7 +133,7 @@ class GpuScene:
         self._meshes, self._made_for = scene.meshes, made_for
         commands, rows = draw_commands(scene.drawables, scene.meshes)
         numbers = [np.arange(len(rows), dtype=np.uint32)] * ("DRAW_ROW" in inputs)
-        self._draws = self._replaced(self._draws, [commands, rows, *numbers])
+        self._draws = self._replaced(self._draws, [rows, *numbers])
         positions, normals, indices, *varying = self._pool
         vertices = [(positions, "3f", "position_object"), (normals, "3f", "normal_object")]
         names = [("4f", "vertex_color")] * color_varies + [("4f", "vertex_uv")] * textured
@@ -143,12 +142,10 @@ class GpuScene:
         self._moved = self._replaced(self._moved, moved)
         moments = ("position_before", "position_after")[: len(moved)]
         vertices += [(buffer, "3f", name) for buffer, name in zip(self._moved, moments, strict=True)]
-        vertices.append((self._draws[1], "2u4/i", "draw"))
-        vertices += [(buffer, "1u4/i", "draw_row") for buffer in self._draws[2:]]
+        vertices.append((self._draws[0], "2u4/i", "draw"))
+        vertices += [(buffer, "1u4/i", "draw_row") for buffer in self._draws[1:]]
         corners = command_corners(scene)
-        return DrawList(
-            tuple(vertices), indices, self._draws[0], commands, corners, color_varies=color_varies, textures=textures
-        )
+        return DrawList(tuple(vertices), indices, commands, corners, color_varies=color_varies, textures=textures)
 
     def _update_materials(self, scene: Scene, slots: Mapping[str, int]) -> TextureSet:
         textures = self._textures.update(scene.textures)

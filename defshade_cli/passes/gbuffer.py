@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import moderngl
+import numpy as np
+from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import Plane, integer_attachments, uses_standard_depth, write_source
@@ -13,6 +15,7 @@ from defshade_cli.gpu.residence import DrawList
 from defshade_cli.gpu.targets import Target, allocate
 from defshade_cli.gpu.textures import textures_source
 from defshade_cli.image.render_space import REC709, RenderSpace
+from defshade_cli.passes.culling import CommandBuffer, may_see
 from defshade_cli.passes.screen import TileMask
 from defshade_cli.scene.camera import Camera
 from defshade_cli.settings import Layout
@@ -83,14 +86,23 @@ class GBufferPass:
             "generated/planes.glsl": write_source(variant.planes, variant.layout),
             "generated/textures.glsl": textures_source(variant.texture_groups),
         }
-        self._gpu, self._context = gpu, gpu.context
+        self._gpu, self._context, self._commands = gpu, gpu.context, CommandBuffer(gpu)
         self._clip_distances = range(_CLIP_DISTANCE0, _CLIP_DISTANCE0 + variant.clipping_planes)
         self._program = gpu.shaders.program(
             "gbuffer.vert", "gbuffer.frag", defines=variant.defines, generated=generated
         )
 
-    def draw(self, draws: DrawList, gbuffer: GBuffer, mask: TileMask, camera: Camera, *, whole: bool = False) -> None:
-        """All of `draws` with the bound View, that of `camera`, one multi-draw; both sides of every face.
+    def draw(
+        self,
+        draws: DrawList,
+        gbuffer: GBuffer,
+        mask: TileMask,
+        camera: Camera,
+        clip_from_relative: NDArray[np.float32],
+        *,
+        whole: bool = False,
+    ) -> None:
+        """What the bound View of `camera` may see of `draws`, one multi-draw; both sides of every face.
 
         Under the mask the depth is the background's afterwards, and the planes are undefined unless `whole`.
         """
@@ -109,7 +121,10 @@ class GBufferPass:
         draws.textures.bind(self._program)
         self._clip(camera)
         vertex_array = self._context.vertex_array(self._program, draws.vertices_of(self._program), draws.indices)
-        vertex_array.render_indirect(draws.commands)
+        seen = may_see(clip_from_relative, draws.corners)
+        self._commands.write(draws.table[seen])
+        if seen.any():
+            vertex_array.render_indirect(self._commands.buffer, count=int(seen.sum()))
         vertex_array.release()
         for distance in self._clip_distances:
             self._context.disable_direct(distance)

@@ -239,7 +239,8 @@ class Pipeline:
         return read_planes(gbuffer, planes, plan)
 
     def _draw_gbuffer(self, draws: DrawList, plan: Plan, gbuffer: GBuffer, sample: Sample) -> None:
-        self._view.write(view_record(plan, gbuffer.layout, sample))
+        view = view_record(plan, gbuffer.layout, sample)
+        self._view.write(view)
         variant = GBufferVariant(
             gbuffer.planes,
             gbuffer.layout,
@@ -251,4 +252,6 @@ class Pipeline:
             plan.transparent,
             plan.camera.projection == "orthographic",
         )
-        self._gbuffer_pass(variant).draw(draws, gbuffer, self._mask, plan.camera, whole=bool(plan.mattes))
+        self._gbuffer_pass(variant).draw(
+            draws, gbuffer, self._mask, plan.camera, view["clip_from_relative"][0], whole=bool(plan.mattes)
+        )

@@ -20,6 +20,7 @@ from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.residence import SHADOW_MAPS, DrawList, RecordBuffer
 from defshade_cli.gpu.textures import textures_source
 from defshade_cli.image.render_space import REC709, RenderSpace
+from defshade_cli.passes.culling import CommandBuffer, may_see
 from defshade_cli.passes.view import clip_from_camera, depth_coefficients
 from defshade_cli.scene.camera import Camera, Projection
 from defshade_cli.scene.emission import Emitter
@@ -38,7 +39,6 @@ _DEPTH_OFFSET = (-2.0, -1.0)
 """Of what a map stores, in slopes a texel and in steps of depth: at the four texels around a receiver a flat surface is
 up to |∂z/∂x| + |∂z/∂y| nearer. An offset along the light moves no shadow's edge, as one of the receiver would."""
 
-_ROUNDING = 1e-5  # what float32 may move a corner, over the greatest coordinate
 _FACES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], np.float64)
 _FACE_FRAMES = tuple(frame_along(-face) for face in _FACES)
 
@@ -176,7 +176,7 @@ class ShadowPass:
         self._depth = gpu.keep(gpu.depth_texture(size))
         self._framebuffer = gpu.keep(gpu.context.framebuffer([], self._depth))
         self._maps = RecordBuffer(gpu, SHADOW_MAPS)
-        self._commands = gpu.keep(gpu.context.buffer(reserve=256))
+        self._commands = CommandBuffer(gpu)
 
     def draw(
         self,
@@ -205,8 +205,8 @@ class ShadowPass:
 
     def _draw_maps(self, draws: DrawList, maps: Sequence[Camera], records: NDArray, casters: NDArray) -> None:
         """Each map with the commands that it may see."""
-        commands = [draws.table[_may_see(m, draws.corners)] for m in records["clip_from_relative"]]
-        self._write_commands(np.concatenate(commands))
+        commands = [draws.table[may_see(m, draws.corners)] for m in records["clip_from_relative"]]
+        self._commands.write(np.concatenate(commands))
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = ">"
         self._context.polygon_offset = _DEPTH_OFFSET
@@ -221,16 +221,11 @@ class ShadowPass:
             if "first_caster" in self._program:
                 self._program["first_caster"] = int(casters[tile])
             if len(seen):
-                array.render_indirect(self._commands, count=len(seen), first=first)
+                array.render_indirect(self._commands.buffer, count=len(seen), first=first)
             first += len(seen)
         array.release()
         self._context.polygon_offset = 0.0, 0.0
         self._maps.write(records)
-
-    def _write_commands(self, commands: NDArray) -> None:
-        data = commands.tobytes()
-        self._commands.orphan(max(len(data), self._commands.size))
-        self._commands.write(data)
 
 
 def _towards(camera: Camera) -> tuple[float, ...]:
@@ -252,13 +247,3 @@ def _map_record(camera: Camera, tile: int, jitter: tuple[float, float]) -> NDArr
     row["texel"], row["resolution"] = max(texel), RESOLUTION
     row["depth_coefficients"] = depth_coefficients(camera, camera.clipping_range, standard=False)
     return row
-
-
-def _may_see(relative_to_clip: NDArray[np.float32], corners: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(C,) False for boxes (C, 8, 3) that lie wholly beyond a plane of the frustum; the matrix is transposed."""
-    with np.errstate(invalid="ignore"):
-        clip = corners @ relative_to_clip[:3].astype(np.float64) + relative_to_clip[3]
-        xyz, w = clip[..., :3], clip[..., 3:]
-        slack = _ROUNDING * np.abs(clip).max(axis=(1, 2), keepdims=True)
-        below, above = xyz < np.array([-1.0, -1.0, 0.0]) * w - slack, xyz > w + slack
-    return ~(below.all(axis=1) | above.all(axis=1)).any(axis=1)
