@@ -189,12 +189,6 @@ def test_bad_curves_are_left_out_and_said(points: list, counts: list[int], reaso
     assert any(reason in said for said in reasons(drawn))
 
 
-def test_without_widths_one_is_taken_and_said() -> None:
-    drawn = read(curves(LINE, [4], "linear", width=None))
-    np.testing.assert_allclose(distances(drawn), 0.5, rtol=1e-5)
-    assert "no widths that fit: 1 is taken" in reasons(drawn)
-
-
 def test_many_curves_are_drawn_with_less_detail() -> None:
     count = 20_000
     drawn = read(curves(np.tile(LINE, (count, 1)), [4] * count, "bezier"))

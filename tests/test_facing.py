@@ -103,6 +103,14 @@ def test_lines_that_recede_are_a_pixel_wide_everywhere() -> None:
     assert np.ptp(seen[:, 1].reshape(2, 2), axis=1) == pytest.approx([1.0, 1.0], abs=1e-5)
 
 
+@pytest.mark.parametrize("complexity", ["auto", "low", "medium", "veryhigh"])
+def test_curves_without_widths_are_lines_of_a_pixel(complexity: Complexity) -> None:
+    bare = curves("(-5, 0, 0), (5, 0, 0)").replace('float[] widths = [2] (interpolation = "constant")', "")
+    scene = read(bare, complexity)
+    np.testing.assert_allclose(np.abs(world_points(scene)).max(axis=0), [5, 0.05, 0], atol=1e-6)
+    assert stages.reasons(scene, "/hair") == ["no widths that fit: its curves are drawn as lines one pixel wide"]
+
+
 def test_periodic_lines_are_closed() -> None:
     closed = curves("(0, 0, 0), (3, 0, 0), (3, 3, 0)", more='uniform token wrap = "periodic"')
     assert len(world_points(read(closed, "low"))) == 3 * 4

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
 from defshade_cli.usd.basis import LARGEST_DETAIL, CurveSamples, Kind, sample_curves
-from defshade_cli.usd.points import read_widths
+from defshade_cli.usd.points import find_widths
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.positions import read_positions
 from defshade_cli.usd.primvars import DISPLAY_COLOR, Authored, authored, fit, read_carried
@@ -51,7 +51,9 @@ def read_curves(
     if samples.left_out:
         issues.append(f"{samples.left_out} curves are left out: they have too few points, or cannot be closed")
     prim = curves.GetPrim()
-    widths = read_widths(prim, time, samples.elements, issues)
+    widths = find_widths(prim, time, samples.elements, issues)
+    if widths is None:
+        issues.append("no widths that fit: its curves are drawn as lines one pixel wide")
     normals = fit(_normals(curves, time), 3, samples.elements, issues)
     carried = read_carried(prim, time, samples.elements, issues, color)
     strands = Strands(kind, counts, points, widths, carried, normals is not None, as_authored.closed)
@@ -94,7 +96,7 @@ def _detailed(kind: Kind, counts: NDArray[np.int64], points: int) -> tuple[Curve
 
 def _swept(strands: Strands, samples: CurveSamples, normals: Primvar | None, sides: int) -> Polygons:
     centres = samples.vertex @ strands.points.astype(np.float64)
-    radii = samples.at(strands.widths) / 2.0
+    radii = np.zeros(samples.count) if strands.widths is None else samples.at(strands.widths) / 2.0
     if normals is None:
         shape = tubes(samples, centres, radii, sides)
     else:

@@ -35,7 +35,7 @@ def faced(placed: Iterable[PlacedSurface], view: View, level: int | None) -> Ite
             shown = spheres if level is None else _disks(spheres, view)
             if len(shown.ids):
                 yield shown, surface
-        elif level is not None and surface.strands is not None and surface.strands.face_at(level):
+        elif surface.strands is not None and surface.strands.face_at(level):
             yield from _strips(piece, surface, view, level)
         else:
             yield piece, surface
@@ -55,7 +55,7 @@ def _disks(spheres: Piece, view: View) -> Piece:
     return replace(disks, root_from_object=turned)
 
 
-def _strips(piece: Piece, surface: Surface, view: View, level: int) -> Iterator[PlacedSurface]:
+def _strips(piece: Piece, surface: Surface, view: View, level: int | None) -> Iterator[PlacedSurface]:
     """Each instance of curves by itself: it is seen from where no other is."""
     assert surface.strands is not None
     camera = view.camera

@@ -242,7 +242,7 @@ def _read_shape(
         return _Shape(*read_points(UsdGeom.Points(prim), time, issues, color, as_disks=as_cages))
     if prim.IsA(UsdGeom.BasisCurves):
         polygons, strands = read_curves(UsdGeom.BasisCurves(prim), time, issues, color)
-        return _Shape(polygons, strands=strands if as_cages else None)
+        return _Shape(polygons, strands=strands if as_cages or strands.widths is None else None)
     if prim.IsA(UsdGeom.NurbsPatch):
         return _Shape(read_patch(UsdGeom.NurbsPatch(prim), time, issues, color))
     return _Shape()

@@ -42,8 +42,8 @@ def read_points(
     return revolve([disk(0.5, 0.0, 1)], 2 * segments) if as_disks else sphere(0.5, segments), copies
 
 
-def read_widths(prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> Primvar:
-    """primvars:widths, else widths. A single value serves all, whatever its interpolation; 1 where none fits."""
+def find_widths(prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> Primvar | None:
+    """primvars:widths, else widths. A single value serves all, whatever its interpolation; None where none fits."""
     primvar = authored(UsdGeom.PrimvarsAPI(prim).GetPrimvar("widths"), time)
     attribute = prim.GetAttribute("widths")
     interpolation = attribute.GetMetadata("interpolation") or UsdGeom.Tokens.vertex
@@ -52,8 +52,12 @@ def read_widths(prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: 
     if value is not None and len(value) == 1:
         return Primvar(np.abs(value), "constant")
     widths = fit(source, 1, elements, issues)
-    if widths is not None:
-        return replace(widths, values=np.abs(widths.values))
+    return None if widths is None else replace(widths, values=np.abs(widths.values))
+
+
+def _widths(prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> Primvar:
+    if (widths := find_widths(prim, time, elements, issues)) is not None:
+        return widths
     issues.append(f"no widths that fit: {FALLBACK_WIDTH:g} is taken")
     return Primvar(np.full(1, FALLBACK_WIDTH, np.float32), "constant")
 
@@ -65,7 +69,7 @@ def _copies(
     elements = count_elements(1, count, count)
     color = read_display(prim, primvar, 3, time, elements, issues)
     opacity = read_display(prim, "displayOpacity", 1, time, elements, issues)
-    widths = np.broadcast_to(read_widths(prim, time, elements, issues).values, (count,))
+    widths = np.broadcast_to(_widths(prim, time, elements, issues).values, (count,))
     drawn = np.isfinite(positions).all(axis=1) & np.isfinite(widths)
     if not drawn.all():
         issues.append(f"{np.count_nonzero(~drawn)} points are left out: they are not finite")

@@ -1,5 +1,6 @@
-"""Curves as Hydra draws them at a fixed complexity: pieces that face the image, shaped once the camera is known.
+"""Curves as pieces that face the image, shaped once the camera is known: as Hydra draws them at a fixed complexity.
 
+    always          where no widths are authored, lines one pixel wide along the curves
     low             lines one pixel wide along the control points, whatever the basis and the widths
     medium, high    ribbons as wide as the curves; flat, and with the normals of a tube
 
@@ -16,12 +17,14 @@ from numpy.typing import NDArray
 
 from defshade_cli.spaces import Matrix, cross, normalize, transform_directions, transform_points
 from defshade_cli.usd.basis import (
+    LARGEST_DETAIL,
     CurveSamples,
     Kind,
     Places,
     control_samples,
     control_weights,
     sample_at,
+    sample_curves,
     tangent_weights,
 )
 from defshade_cli.usd.polygons import Polygons, Primvar
@@ -48,46 +51,44 @@ class Strands:
     """Curves before they are sampled.
 
     counts: (K,) control points of each curve, all there.  points: (P, 3) float32, finite.
-    widths, carried: fit the kind's elements.  oriented: normals are authored, so that only lines face the image.
+    widths, carried: fit the kind's elements, widths None where none do.
+    oriented: normals are authored, so that only lines face the image.
     loops: the wrap is authored as periodic; lines are closed even where no number of segments closes the curves.
     """
 
     kind: Kind
     counts: NDArray[np.int64]
     points: NDArray[np.float32]
-    widths: Primvar
+    widths: Primvar | None
     carried: Carried
     oriented: bool
     loops: bool
 
-    def face_at(self, level: int) -> bool:
-        """Whether anything of them faces the image at a level of refinement."""
+    def face_at(self, level: int | None) -> bool:
+        """Whether they face the image at a level of refinement, None for what they are from all sides."""
+        if self.widths is None or level is None:
+            return self.widths is None
         return level == 0 or (level < TUBE_LEVEL and not self.oriented)
 
-    def facing(self, camera_from_object: Matrix, view: View, level: int) -> Polygons:
-        """The pieces in camera space."""
+    def facing(self, camera_from_object: Matrix, view: View, level: int | None) -> Polygons:
+        """The pieces in camera space, of strands that face the image."""
         points = transform_points(camera_from_object, self.points.astype(np.float64))
-        pieces = self._lines(points, view) if level == 0 else self._ribbons(points, camera_from_object, view)
-        return _polygons(pieces, _ACROSS[level >= ROUND_LEVEL], self.carried)
+        if level != 0 and self.widths is not None:
+            across = _ACROSS[level is not None and level >= ROUND_LEVEL]
+            return _polygons(self._ribbons(self.widths, points, camera_from_object, view), across, self.carried)
+        if level == 0:
+            samples = control_samples(self.kind, self.counts, len(points), self.loops)
+        else:
+            samples = sample_curves(self.kind, self.counts, len(points), LARGEST_DETAIL)
+        return _polygons(_lines(samples, points, view), _ACROSS[False], self.carried)
 
-    def _lines(self, points: Vectors, view: View) -> _Pieces:
-        samples = control_samples(self.kind, self.counts, len(points), self.loops)
-        centres = samples.vertex @ points
-        after = following(samples)
-        start = np.flatnonzero(after >= 0)
-        end = after[start]
-        ends = np.stack([centres[start], centres[end]], axis=1)
-        sideways = normalize(_seen_across(ends, view))
-        reach = 0.5 / view.pixels_at(-ends[..., 2])
-        return _Pieces(samples, np.stack([start, end], axis=1), ends, reach[..., None] * sideways[:, None])
-
-    def _ribbons(self, points: Vectors, camera_from_object: Matrix, view: View) -> _Pieces:
+    def _ribbons(self, widths: Primvar, points: Vectors, camera_from_object: Matrix, view: View) -> _Pieces:
         places, start = self._cut(points, view)
         samples = sample_at(self.kind, self.counts, len(points), places)
         tangents = tangent_weights(self.kind, self.counts, len(points), places) @ points
         sideways = normalize(cross(tangents, np.array([0.0, 0.0, 1.0])))
         stretch = np.linalg.norm(transform_directions(camera_from_object, sideways), axis=1)
-        offsets = (0.5 * samples.at(self.widths) * stretch)[:, None] * sideways
+        offsets = (0.5 * samples.at(widths) * stretch)[:, None] * sideways
         index = np.stack([start, start + 1], axis=1)
         return _Pieces(samples, index, (samples.vertex @ points)[index], offsets[index])
 
@@ -113,6 +114,15 @@ class _Pieces:
     index: NDArray[np.intp]
     ends: Vectors
     offsets: Vectors
+
+
+def _lines(samples: CurveSamples, points: Vectors, view: View) -> _Pieces:
+    after = following(samples)
+    start = np.flatnonzero(after >= 0)
+    index = np.stack([start, after[start]], axis=1)
+    ends = (samples.vertex @ points)[index]
+    reach = 0.5 / view.pixels_at(-ends[..., 2])
+    return _Pieces(samples, index, ends, reach[..., None] * normalize(_seen_across(ends, view))[:, None])
 
 
 def fractional_odd(levels: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
