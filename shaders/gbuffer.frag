@@ -10,6 +10,7 @@
 
 in vec3 normal_relative;
 in vec4 display_color;
+flat in Material authored;
 flat in uint material_index;
 flat in uint instance_index;
 flat in float handedness;
@@ -71,7 +72,7 @@ float cosine_to_eye(vec3 normal) {
 }
 
 void main() {
-    Material material = material_at(material_index, display_color);
+    Material material = with_display(authored, display_color);
     float side = gl_FrontFacing ? handedness : -handedness;
     vec3 normal = normalize(normal_relative);
     Detail detail = detail_of(normal);

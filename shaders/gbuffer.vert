@@ -1,4 +1,5 @@
 #include "lib/view.glsl"
+#include "lib/material.glsl"
 
 layout(std430, binding = 1) readonly buffer InstanceBlock { Instance instances[]; };
 
@@ -38,6 +39,7 @@ in uvec2 draw;                 // instance, material
 
 out vec3 normal_relative;
 out vec4 display_color;
+flat out Material authored;    // a software rasteriser fetches it faster here than at each pixel
 flat out uint material_index;
 flat out uint instance_index;
 flat out float handedness;
@@ -62,6 +64,7 @@ void main() {
 #endif
     instance_index = draw.x;
     material_index = draw.y;
+    authored = materials[draw.y];
     handedness = instance.handedness;
 #ifdef PLANE_LINKS
     link_set = instance.link_set;

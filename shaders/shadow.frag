@@ -37,7 +37,7 @@ float cast_coverage(Material material) {
 #endif
 
 void main() {
-    Material material = material_at(material_index, display_color);
+    Material material = with_display(materials[material_index], display_color);
     if (is_cut_out(cast_coverage(material), instance_index, material_index)) discard;
 }
 #else
