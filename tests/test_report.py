@@ -6,7 +6,6 @@ import html
 import json
 import shutil
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -21,20 +20,24 @@ BROWSER = next((path for name in ("chromium", "google-chrome") if (path := shuti
 QUIET = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run")
 
 
-@pytest.fixture
-def report(tmp_path: Path) -> Iterator[Path]:
-    """Of two stages: two frames, one with a warning, and one frame that failed."""
+def written_report(folder: Path, frames: int) -> Path:
+    """Of two stages: frames of which the second has a warning, and one frame that failed."""
+    path = folder / "shot.exr"
+    write(film("beauty", "depth", "normal"), OutputSettings(), path)
     outcomes = []
-    for frame in (1.0, 2.0):
-        path = tmp_path / f"shot.{frame:g}.exr"
-        write(film("beauty", "depth", "normal"), OutputSettings(), path)
+    for frame in map(float, range(1, frames + 1)):
         task = Chunk(RenderJob(Path("shot.usda"), (frame,)))
         log = "defshade: warning: a <light> is dark\n" if frame == 2.0 else ""
         outcomes.append(Outcome(task, frame, (path,), seconds={"draw": 0.25}, log=log))
     broken = Chunk(RenderJob(Path("broken.usda"), (1.0,)), attempt=2)
     outcomes.append(Outcome(broken, 1.0, error="broken.usda is not a USD stage", log="line 3: <oops>\n"))
-    write_report(outcomes, 12.5, tmp_path / "out" / "report.html")
-    return tmp_path / "out" / "report.html"
+    write_report(outcomes, 12.5, folder / "out" / "report.html")
+    return folder / "out" / "report.html"
+
+
+@pytest.fixture
+def report(tmp_path: Path) -> Path:
+    return written_report(tmp_path, frames=2)
 
 
 def test_the_record_holds_every_frame(report: Path) -> None:
@@ -63,24 +66,41 @@ def test_an_unreadable_image_is_told(tmp_path: Path) -> None:
 
 
 DRIVE = """<script>
+  const failed = document.querySelector("figure.failed"), log = failed.querySelector("pre");
+  const last = [...document.querySelectorAll("figure.fine img.shown")].at(-1);
+  const low = () => Math.round(last.getBoundingClientRect().top);
+  const seen = element => element.checkVisibility() && element.getBoundingClientRect().height > 0;
+  const frames = () => [...document.querySelectorAll("figure")].filter(seen).length;
+  const layers = () => [...new Set([...document.querySelectorAll("img")].filter(seen).map(i => i.dataset.layer))];
+  const told = {before: [layers(), frames(), seen(log), low() > innerHeight]};
+  scrollTo(0, document.body.scrollHeight);
+  told.scrolled = [scrollY > 0, low() < innerHeight, last.naturalWidth > 0];
+  told.header = Math.round(document.querySelector("header").getBoundingClientRect().top);
   document.querySelector('#layers button[data-layer="depth"]').click();
-  document.querySelector("figure.failed details").open = true;
+  told.switched = [layers(), document.querySelector("button.chosen").textContent];
+  failed.querySelector("summary").click();
+  told.log = [seen(log), log.textContent];
   document.getElementById("troubles").click();
-  scrollTo(0, 50);
-  const shown = [...document.querySelectorAll("figure:not([hidden]) img.shown")].map(image => image.dataset.layer);
-  const widths = [...document.querySelectorAll("img.shown")].map(image => image.naturalWidth);
-  const log = document.querySelector("figure.failed pre").textContent;
-  document.title = JSON.stringify({shown, log, hidden: document.querySelectorAll("figure[hidden]").length});
+  told.troubles = frames();
+  document.title = JSON.stringify(told);
 </script>"""
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium")
-def test_the_page_in_a_browser(report: Path, tmp_path: Path) -> None:
-    """Switch to a layer, open the log of the frame that failed, keep only troubles: what the page then shows."""
+def test_the_page_in_a_browser(tmp_path: Path) -> None:
+    """Scroll to the end, switch to a layer, open the log of the frame that failed, keep only troubles."""
+    report = written_report(tmp_path, frames=40)
     driven = tmp_path / "driven.html"
     driven.write_text(report.read_text().replace("</html>", DRIVE + "</html>"))
     profile = f"--user-data-dir={tmp_path / 'profile'}"
-    command = [str(BROWSER), *QUIET, profile, "--dump-dom", driven.as_uri()]
+    command = [str(BROWSER), *QUIET, profile, "--window-size=800,600", "--dump-dom", driven.as_uri()]
     shown = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
     title = html.unescape(shown.partition("<title>")[2].partition("</title>")[0])
-    assert json.loads(title) == {"shown": ["depth"], "log": "line 3: <oops>\n", "hidden": 1}
+    assert json.loads(title) == {
+        "before": [["beauty"], 41, False, True],
+        "scrolled": [True, True, True],
+        "header": 0,
+        "switched": [["depth"], "depth"],
+        "log": [True, "line 3: <oops>\n"],
+        "troubles": 2,
+    }
