@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import logging
 import shutil
+import struct
 from pathlib import Path
 
 import pytest
-from pxr import UsdUtils
+from pxr import Tf, Usd, UsdGeom, UsdUtils
 
 from defshade_cli.errors import StageNotFound
 from defshade_cli.usd.reader import StageReader
@@ -104,6 +105,21 @@ def test_metres_may_be_single_precision(assets: Path) -> None:
     assert meters_per_unit(open_stage(assets / "tiny_blender_exports_a" / "suzanne.usdc")) == 1.0
 
 
+def test_metres_in_single_precision_are_read_where_usds_accessor_raises(tmp_path: Path) -> None:
+    """A crate file whose metersPerUnit is marked as a float, as old exporters wrote it: types are 9 and 8."""
+    stage = Usd.Stage.CreateNew(str(tmp_path / "double.usdc"))
+    UsdGeom.SetStageMetersPerUnit(stage, 0.25)
+    stage.Save()
+    double = struct.pack("<f", 0.25) + b"\x00\x00\x09\x40"
+    crate = (tmp_path / "double.usdc").read_bytes()
+    assert crate.count(double) == 1
+    (tmp_path / "single.usdc").write_bytes(crate.replace(double, double[:6] + b"\x08\x40"))
+    old = open_stage(tmp_path / "single.usdc")
+    with pytest.raises(Tf.ErrorException):
+        UsdGeom.GetStageMetersPerUnit(old)
+    assert meters_per_unit(old) == 0.25
+
+
 @pytest.mark.parametrize(
     ("metadata", "rate"),
     [
@@ -116,6 +132,15 @@ def test_metres_may_be_single_precision(assets: Path) -> None:
 )
 def test_frames_per_second_are_positive(metadata: str, rate: float) -> None:
     assert frames_per_second(stage_of("", metadata)) == rate
+
+
+@pytest.mark.parametrize("rate", [0.0, -25.0, float("inf")])
+def test_a_rate_of_frames_that_is_none_counts_as_not_authored(rate: float) -> None:
+    """USD's text refuses such a rate; crate files hold it."""
+    stage = stage_of("", "timeCodesPerSecond = 50")
+    stage.SetFramesPerSecond(rate)
+    assert stage.GetFramesPerSecond() == rate
+    assert frames_per_second(stage) == 50.0
 
 
 @pytest.mark.parametrize(

@@ -25,11 +25,29 @@ from defshade_cli.plan import make_plan
 from defshade_cli.scene.geometry import Subset
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
-from defshade_cli.scene.texture import ImageFile, Texture, TextureInput
+from defshade_cli.scene.texture import Channel, ImageFile, Texture, TextureInput
 from defshade_cli.settings import RenderSettings
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.stage import open_stage
 
+BACK_SLASHES = """#usda 1.0
+def Cube "c" (prepend apiSchemas = ["MaterialBindingAPI"]) {
+    rel material:binding = </m>
+}
+def Material "m" {
+    token outputs:surface.connect = </m/s.outputs:surface>
+    def Shader "s" {
+        uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:diffuseColor.connect = </m/t.outputs:rgb>
+        token outputs:surface
+    }
+    def Shader "t" {
+        uniform token info:id = "UsdUVTexture"
+        asset inputs:file = @.\\maps\\NAME@
+        float3 outputs:rgb
+    }
+}
+"""
 SIDE = 16
 FULL_VIEW = camera(z=1.0, half=1.0)
 """Sees exactly the unit quad: pixel centres fall on texel centres of an image as large as the picture."""
@@ -127,6 +145,18 @@ def test_channels_are_filled_as_the_schema_says(tmp_path: Path) -> None:
     np.testing.assert_array_equal(load(save(tmp_path / "rgba.png", colors)).texels[::-1], colors, "alpha is multiplied")
 
 
+@pytest.mark.parametrize("name", ["wood.png", "wood.<UDIM>.png"])
+def test_back_slashes_in_paths_are_slashes(tmp_path: Path, name: str) -> None:
+    (tmp_path / "maps").mkdir()
+    file = tmp_path / "maps" / name.replace("<UDIM>", "1001")
+    save(file, noise(3))
+    (tmp_path / "s.usda").write_text(BACK_SLASHES.replace("NAME", name))
+    scene = StageReader(open_stage(tmp_path / "s.usda")).read(None)
+    (texture,) = scene.textures
+    assert [Path(tile.path) for _, tile in texture.tiles] == [file]
+    assert not scene.unsupported
+
+
 def test_a_missing_and_a_broken_file_are_logged_and_left_out(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     (tmp_path / "broken.png").write_bytes(b"no image")
     sources = [Source(ImageFile(str(tmp_path / name)), "auto") for name in ("missing.png", "broken.png")]
@@ -175,6 +205,21 @@ def test_channel_scale_and_bias(pipeline: Pipeline, tmp_path: Path) -> None:
     roughness = TextureInput(texture, "g", scale=(0.5,) * 4, bias=(0.25,) * 4)
     found = layer(pipeline, textured({"roughness": roughness}), "roughness")
     np.testing.assert_allclose(found[..., 0], pixels[..., 1] / 255 * 0.5 + 0.25, atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("channels", "channel", "source"),
+    [(1, "g", 0), (1, "b", 0), (1, "a", None), (2, "b", 0), (2, "a", 1), (3, "a", None)],
+)
+def test_channels_that_an_image_lacks(
+    pipeline: Pipeline, tmp_path: Path, channels: int, channel: Channel, source: int | None
+) -> None:
+    """One channel repeats, two are gray and alpha, and alpha that is missing is 1, as the UsdUVTexture schema says."""
+    pixels = noise(channels)
+    texture = plain(save(tmp_path / "a.png", pixels), color_space="raw")
+    found = layer(pipeline, textured({"roughness": TextureInput(texture, channel)}), "roughness")
+    expected = np.ones((SIDE, SIDE)) if source is None else pixels[..., source] / 255
+    np.testing.assert_allclose(found[..., 0], expected, atol=2e-3)
 
 
 @pytest.mark.parametrize("mode", ["black", "clamp", "repeat", "mirror"])
