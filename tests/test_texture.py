@@ -1,25 +1,19 @@
-"""Textures: files to texels, texels to pixels."""
+"""Textures: texels to pixels."""
 
 from __future__ import annotations
 
 import logging
-import struct
-import zlib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO as oiio
 import pytest
 from numpy.typing import NDArray
 
 from build import at, bulb, camera, drawable, quad, scene, sun
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.textures import group_images
 from defshade_cli.gpu.vertices import uv_slots
-from defshade_cli.image import texture as images
-from defshade_cli.image.texture import Source, TexelImage, load_images
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.geometry import Subset
@@ -29,26 +23,8 @@ from defshade_cli.scene.texture import Channel, ImageFile, Texture, TextureInput
 from defshade_cli.settings import RenderSettings
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.stage import open_stage
+from texels import SIDE, linear, noise, save
 
-BACK_SLASHES = """#usda 1.0
-def Cube "c" (prepend apiSchemas = ["MaterialBindingAPI"]) {
-    rel material:binding = </m>
-}
-def Material "m" {
-    token outputs:surface.connect = </m/s.outputs:surface>
-    def Shader "s" {
-        uniform token info:id = "UsdPreviewSurface"
-        color3f inputs:diffuseColor.connect = </m/t.outputs:rgb>
-        token outputs:surface
-    }
-    def Shader "t" {
-        uniform token info:id = "UsdUVTexture"
-        asset inputs:file = @.\\maps\\NAME@
-        float3 outputs:rgb
-    }
-}
-"""
-SIDE = 16
 FULL_VIEW = camera(z=1.0, half=1.0)
 """Sees exactly the unit quad: pixel centres fall on texel centres of an image as large as the picture."""
 
@@ -56,32 +32,6 @@ FULL_VIEW = camera(z=1.0, half=1.0)
 @pytest.fixture(scope="module")
 def pipeline(gpu: Gpu) -> Iterator[Pipeline]:
     yield Pipeline(gpu)
-
-
-def save(path: Path, pixels: NDArray, **attributes: str) -> ImageFile:
-    """`pixels`, row 0 at the top, in their own type."""
-    kind = {"uint8": "uint8", "uint16": "uint16", "float16": "half", "float32": "float"}[pixels.dtype.name]
-    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], kind)
-    spec.attribute("oiio:UnassociatedAlpha", 1)
-    for name, value in attributes.items():
-        spec.attribute(name, value)
-    out = oiio.ImageOutput.create(str(path))
-    assert out.open(str(path), spec) and out.write_image(np.ascontiguousarray(pixels)) and out.close()
-    return ImageFile(str(path))
-
-
-def noise(channels: int, side: int = SIDE) -> NDArray[np.uint8]:
-    return np.random.default_rng(1).integers(0, 256, (side, side, channels), np.uint8)
-
-
-def linear(encoded: NDArray) -> NDArray:
-    """IEC 61966-2-1."""
-    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
-
-
-def load(file: ImageFile, color_space: str = "auto") -> TexelImage:
-    source = Source(file, color_space)  # type: ignore[arg-type]
-    return load_images([source])[source]
 
 
 def plain(file: ImageFile, **options: object) -> Texture:
@@ -98,93 +48,6 @@ def textured(inputs: dict[str, TextureInput], uv: NDArray | None = None, **field
 def layer(pipeline: Pipeline, built: Scene, name: str, size: int = SIDE) -> NDArray[np.float32]:
     plan = make_plan(built, RenderSettings(size=(size, size), layers=(name,)))
     return pipeline.render(built, plan).layers[name]
-
-
-# Files
-
-
-@pytest.mark.parametrize("suffix", [".png", ".tif", ".tga", ".webp"])
-def test_eight_bit_files_keep_their_bytes(tmp_path: Path, suffix: str) -> None:
-    pixels = noise(3)
-    path = tmp_path / f"image{suffix}"
-    file = save(path, pixels, **({"compression": "lossless"} if suffix == ".webp" else {}))
-    found = load(file)
-    assert found.srgb
-    np.testing.assert_array_equal(found.texels[::-1, :, :3], pixels)
-    assert (found.texels[..., 3] == 255).all()
-
-
-def test_a_jpeg_is_what_openimageio_decodes(tmp_path: Path) -> None:
-    file = save(tmp_path / "image.jpg", noise(3))
-    np.testing.assert_array_equal(load(file).texels[::-1, :, :3], oiio.ImageBuf(file.path).get_pixels(oiio.UINT8))
-
-
-@pytest.mark.parametrize("suffix", [".exr", ".hdr"])
-def test_float_files_become_half_and_stay_linear(tmp_path: Path, suffix: str) -> None:
-    pixels = np.random.default_rng(2).random((SIDE, SIDE, 3)).astype(np.float32) * 8
-    file = save(tmp_path / f"image{suffix}", pixels)
-    stored = oiio.ImageBuf(file.path).get_pixels(oiio.FLOAT)
-    found = load(file)
-    assert found.texels.dtype == np.float16 and not found.srgb
-    np.testing.assert_allclose(found.texels[::-1, :, :3], stored, rtol=2**-10)
-
-
-def test_sixteen_bit_colours_are_linear_unless_called_srgb(tmp_path: Path) -> None:
-    pixels = (noise(3).astype(np.uint16) * 257).astype(np.uint16)
-    file = save(tmp_path / "image.png", pixels)
-    np.testing.assert_allclose(load(file).texels[::-1, :, :3], pixels / 65535, rtol=2**-10, atol=1e-7)
-    np.testing.assert_allclose(load(file, "sRGB").texels[::-1, :, :3], linear(pixels / 65535), rtol=2**-10, atol=1e-7)
-
-
-def test_channels_are_filled_as_the_schema_says(tmp_path: Path) -> None:
-    gray, gray_alpha, colors = noise(1), noise(2), noise(4)
-    assert load(save(tmp_path / "gray.png", gray)).texels.shape == (SIDE, SIDE, 1)
-    found = load(save(tmp_path / "gray_alpha.png", gray_alpha))
-    assert not found.srgb
-    np.testing.assert_array_equal(found.texels[::-1], gray_alpha[..., [0, 0, 0, 1]])
-    np.testing.assert_array_equal(load(save(tmp_path / "rgba.png", colors)).texels[::-1], colors, "alpha is multiplied")
-
-
-@pytest.mark.parametrize("name", ["wood.png", "wood.<UDIM>.png"])
-def test_back_slashes_in_paths_are_slashes(tmp_path: Path, name: str) -> None:
-    (tmp_path / "maps").mkdir()
-    file = tmp_path / "maps" / name.replace("<UDIM>", "1001")
-    save(file, noise(3))
-    (tmp_path / "s.usda").write_text(BACK_SLASHES.replace("NAME", name))
-    scene = StageReader(open_stage(tmp_path / "s.usda")).read(None)
-    (texture,) = scene.textures
-    assert [Path(tile.path) for _, tile in texture.tiles] == [file]
-    assert not scene.unsupported
-
-
-def test_a_missing_and_a_broken_file_are_logged_and_left_out(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    (tmp_path / "broken.png").write_bytes(b"no image")
-    sources = [Source(ImageFile(str(tmp_path / name)), "auto") for name in ("missing.png", "broken.png")]
-    with caplog.at_level(logging.WARNING, "defshade"):
-        assert load_images(sources) == {}
-    assert "missing.png" in caplog.text and "broken.png" in caplog.text
-
-
-def test_large_images_are_reduced_and_a_full_budget_halves_them(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file = save(tmp_path / "flat.png", np.full((128, 256, 3), 77, np.uint8))
-    monkeypatch.setattr(images, "LARGEST", 128)
-    found = load(file).texels
-    assert found.shape == (64, 128, 4) and (found[..., :3] == 77).all()
-    monkeypatch.setattr(images, "BUDGET", 64 * 32 * 4 * 4 // 3 + 1)
-    assert load(file).texels.shape == (32, 64, 4)
-
-
-def test_groups_never_pass_the_units() -> None:
-    shapes = [(2 + i, 3 + j) for i in range(5) for j in range(5)]
-    found = {
-        Source(ImageFile(str(shape)), "auto"): TexelImage(np.zeros((*shape, 4), np.uint8), True) for shape in shapes
-    }
-    assert len(group_images(found, 32)) == 25
-    few = group_images(found, 8)
-    assert len(few) <= 8 and sum(map(len, few)) == 25
-    assert all(len({image.texels.shape for image in group.values()}) == 1 for group in few)
 
 
 # Pixels
@@ -392,17 +255,3 @@ def test_a_texture_inside_a_package_is_drawn(pipeline: Pipeline, assets: Path) -
     assert texture.tiles[0][1].contents
     albedo = layer(pipeline, read, "albedo", 64)
     assert len(np.unique(albedo.reshape(-1, 3), axis=0)) > 50
-
-
-def test_a_header_that_claims_100000_texels_a_side_is_a_warning(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    header = chunk(b"IHDR", struct.pack(">IIBBBBB", 100_000, 100_000, 8, 2, 0, 0, 0))
-    body = chunk(b"IDAT", zlib.compress(bytes(999))) + chunk(b"IEND", b"")
-    (tmp_path / "huge.png").write_bytes(b"\x89PNG\r\n\x1a\n" + header + body)
-    assert load_images([Source(ImageFile(str(tmp_path / "huge.png")), "auto")]) == {}
-    assert "exceeds the 8192 MB limit" in caplog.text
-    assert "\n" not in caplog.records[0].getMessage()

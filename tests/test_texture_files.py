@@ -1,0 +1,137 @@
+"""Textures: files to texels."""
+
+from __future__ import annotations
+
+import logging
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+
+from defshade_cli.gpu.textures import group_images
+from defshade_cli.image import texture as images
+from defshade_cli.image.texture import Source, TexelImage, load_images
+from defshade_cli.scene.texture import ImageFile
+from defshade_cli.usd.reader import StageReader
+from defshade_cli.usd.stage import open_stage
+from texels import SIDE, linear, load, noise, save
+
+BACK_SLASHES = """#usda 1.0
+def Cube "c" (prepend apiSchemas = ["MaterialBindingAPI"]) {
+    rel material:binding = </m>
+}
+def Material "m" {
+    token outputs:surface.connect = </m/s.outputs:surface>
+    def Shader "s" {
+        uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:diffuseColor.connect = </m/t.outputs:rgb>
+        token outputs:surface
+    }
+    def Shader "t" {
+        uniform token info:id = "UsdUVTexture"
+        asset inputs:file = @.\\maps\\NAME@
+        float3 outputs:rgb
+    }
+}
+"""
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tif", ".tga", ".webp"])
+def test_eight_bit_files_keep_their_bytes(tmp_path: Path, suffix: str) -> None:
+    pixels = noise(3)
+    path = tmp_path / f"image{suffix}"
+    file = save(path, pixels, **({"compression": "lossless"} if suffix == ".webp" else {}))
+    found = load(file)
+    assert found.srgb
+    np.testing.assert_array_equal(found.texels[::-1, :, :3], pixels)
+    assert (found.texels[..., 3] == 255).all()
+
+
+def test_a_jpeg_is_what_openimageio_decodes(tmp_path: Path) -> None:
+    file = save(tmp_path / "image.jpg", noise(3))
+    np.testing.assert_array_equal(load(file).texels[::-1, :, :3], oiio.ImageBuf(file.path).get_pixels(oiio.UINT8))
+
+
+@pytest.mark.parametrize("suffix", [".exr", ".hdr"])
+def test_float_files_become_half_and_stay_linear(tmp_path: Path, suffix: str) -> None:
+    pixels = np.random.default_rng(2).random((SIDE, SIDE, 3)).astype(np.float32) * 8
+    file = save(tmp_path / f"image{suffix}", pixels)
+    stored = oiio.ImageBuf(file.path).get_pixels(oiio.FLOAT)
+    found = load(file)
+    assert found.texels.dtype == np.float16 and not found.srgb
+    np.testing.assert_allclose(found.texels[::-1, :, :3], stored, rtol=2**-10)
+
+
+def test_sixteen_bit_colours_are_linear_unless_called_srgb(tmp_path: Path) -> None:
+    pixels = (noise(3).astype(np.uint16) * 257).astype(np.uint16)
+    file = save(tmp_path / "image.png", pixels)
+    np.testing.assert_allclose(load(file).texels[::-1, :, :3], pixels / 65535, rtol=2**-10, atol=1e-7)
+    np.testing.assert_allclose(load(file, "sRGB").texels[::-1, :, :3], linear(pixels / 65535), rtol=2**-10, atol=1e-7)
+
+
+def test_channels_are_filled_as_the_schema_says(tmp_path: Path) -> None:
+    gray, gray_alpha, colors = noise(1), noise(2), noise(4)
+    assert load(save(tmp_path / "gray.png", gray)).texels.shape == (SIDE, SIDE, 1)
+    found = load(save(tmp_path / "gray_alpha.png", gray_alpha))
+    assert not found.srgb
+    np.testing.assert_array_equal(found.texels[::-1], gray_alpha[..., [0, 0, 0, 1]])
+    np.testing.assert_array_equal(load(save(tmp_path / "rgba.png", colors)).texels[::-1], colors, "alpha is multiplied")
+
+
+@pytest.mark.parametrize("name", ["wood.png", "wood.<UDIM>.png"])
+def test_back_slashes_in_paths_are_slashes(tmp_path: Path, name: str) -> None:
+    (tmp_path / "maps").mkdir()
+    file = tmp_path / "maps" / name.replace("<UDIM>", "1001")
+    save(file, noise(3))
+    (tmp_path / "s.usda").write_text(BACK_SLASHES.replace("NAME", name))
+    scene = StageReader(open_stage(tmp_path / "s.usda")).read(None)
+    (texture,) = scene.textures
+    assert [Path(tile.path) for _, tile in texture.tiles] == [file]
+    assert not scene.unsupported
+
+
+def test_a_missing_and_a_broken_file_are_logged_and_left_out(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (tmp_path / "broken.png").write_bytes(b"no image")
+    sources = [Source(ImageFile(str(tmp_path / name)), "auto") for name in ("missing.png", "broken.png")]
+    with caplog.at_level(logging.WARNING, "defshade"):
+        assert load_images(sources) == {}
+    assert "missing.png" in caplog.text and "broken.png" in caplog.text
+
+
+def test_large_images_are_reduced_and_a_full_budget_halves_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = save(tmp_path / "flat.png", np.full((128, 256, 3), 77, np.uint8))
+    monkeypatch.setattr(images, "LARGEST", 128)
+    found = load(file).texels
+    assert found.shape == (64, 128, 4) and (found[..., :3] == 77).all()
+    monkeypatch.setattr(images, "BUDGET", 64 * 32 * 4 * 4 // 3 + 1)
+    assert load(file).texels.shape == (32, 64, 4)
+
+
+def test_groups_never_pass_the_units() -> None:
+    shapes = [(2 + i, 3 + j) for i in range(5) for j in range(5)]
+    found = {
+        Source(ImageFile(str(shape)), "auto"): TexelImage(np.zeros((*shape, 4), np.uint8), True) for shape in shapes
+    }
+    assert len(group_images(found, 32)) == 25
+    few = group_images(found, 8)
+    assert len(few) <= 8 and sum(map(len, few)) == 25
+    assert all(len({image.texels.shape for image in group.values()}) == 1 for group in few)
+
+
+def test_a_header_that_claims_100000_texels_a_side_is_a_warning(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = chunk(b"IHDR", struct.pack(">IIBBBBB", 100_000, 100_000, 8, 2, 0, 0, 0))
+    body = chunk(b"IDAT", zlib.compress(bytes(999))) + chunk(b"IEND", b"")
+    (tmp_path / "huge.png").write_bytes(b"\x89PNG\r\n\x1a\n" + header + body)
+    assert load_images([Source(ImageFile(str(tmp_path / "huge.png")), "auto")]) == {}
+    assert "exceeds the 8192 MB limit" in caplog.text
+    assert "\n" not in caplog.records[0].getMessage()
