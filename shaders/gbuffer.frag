@@ -21,7 +21,7 @@ flat in uint link_set;
 in vec3 position_relative;
 #endif
 #ifdef TEXTURES
-in vec4 uv;
+in UvSets uv;
 #endif
 #ifdef LAYER_UV
 in vec2 layer_uv;

@@ -9,7 +9,8 @@ in vec3 normal_object;
 in vec4 vertex_color;          // alpha is opacity; negative: the instance's value counts
 #endif
 #ifdef TEXTURES
-in vec4 vertex_uv;             // two sets
+#include "lib/uv_type.glsl"
+in UvSets vertex_uv;
 #endif
 #ifdef LAYER_UV
 in vec2 vertex_layer_uv;
@@ -50,7 +51,7 @@ flat out uint link_set;
 out vec3 position_relative;
 #endif
 #ifdef TEXTURES
-out vec4 uv;
+out UvSets uv;
 #endif
 
 void main() {

@@ -5,7 +5,7 @@
 #ifdef TEXTURES
 #include "lib/texture.glsl"
 
-in vec4 uv;
+in UvSets uv;
 #endif
 #ifdef TRANSPARENT
 in vec3 position_relative;

@@ -16,8 +16,9 @@ in uvec2 draw;                 // instance, material
 in vec4 vertex_color;
 #endif
 #ifdef TEXTURES
-in vec4 vertex_uv;
-out vec4 uv;
+#include "lib/uv_type.glsl"
+in UvSets vertex_uv;
+out UvSets uv;
 #endif
 out vec4 display_color;
 flat out uint material_index;

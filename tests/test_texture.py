@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from build import at, bulb, camera, drawable, quad, scene, sun
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.vertices import uv_slots
+from defshade_cli.gpu.vertices import sets_of, uv_slots
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.geometry import Subset
@@ -162,12 +162,32 @@ def test_subsets_may_name_different_coordinates(pipeline: Pipeline, tmp_path: Pa
 def test_sets_that_share_no_mesh_share_a_slot() -> None:
     assert uv_slots([("st",), ("map1",)]) == {"st": 0, "map1": 0}
     assert uv_slots([("st", "map1"), ("map1", "map2")]) == {"st": 0, "map1": 1, "map2": 0}
+    assert [sets_of(uv_slots([tuple(names)])) for names in ("", "ab", "abc")] == [2, 2, 8]
 
 
-def test_a_third_set_on_one_mesh_is_said(caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize("count", [2, 3, 8])
+def test_each_input_reads_its_own_set(pipeline: Pipeline, tmp_path: Path, count: int) -> None:
+    """One texel of the image a set, of as many as materials can read."""
+    ramp = np.arange(SIDE, dtype=np.uint8)[None, :, None].repeat(SIDE, 0).repeat(3, 2) * 16
+    texture = plain(save(tmp_path / "a.png", ramp), color_space="raw")
+    fields = ("roughness", "metallic", "diffuse_color", "opacity", "clearcoat", "occlusion", "ior", "emissive_color")
+    inputs = {field: TextureInput(texture, "g", uv=f"uv{n}") for n, field in enumerate(fields[:count])}
+    built = textured(inputs)
+    uvs = {f"uv{n}": np.full((4, 2), (n + 0.5) / SIDE) for n in range(count)}
+    built = replace(built, meshes=(replace(built.meshes[0], uvs=uvs),))
+    for n, field in enumerate(fields[: min(count, 3)]):
+        shown = layer(pipeline, built, "albedo" if field == "diffuse_color" else field)
+        np.testing.assert_allclose(shown[SIDE // 2, SIDE // 2, 0], n * 16 / 255, atol=2e-3)
+    if count == 8:
+        emitted = layer(pipeline, built, "emission")
+        np.testing.assert_allclose(emitted[SIDE // 2, SIDE // 2, 0], 7 * 16 / 255, atol=2e-3)
+        assert np.isfinite(layer(pipeline, built, "beauty")).all(), "with the shadow of what is cut out"
+
+
+def test_a_ninth_set_on_one_mesh_is_said(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING, "defshade"):
-        assert uv_slots([("a", "b", "c")]) == {"a": 0, "b": 1}
-    assert "coordinates c" in caplog.text
+        assert uv_slots([tuple("abcdefghi")]) == {name: n for n, name in enumerate("abcdefgh")}
+    assert "coordinates i" in caplog.text
 
 
 # Normal maps

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.records import record
 from defshade_cli.gpu.textures import TextureSet, TextureStore, input_records
-from defshade_cli.gpu.vertices import in_slots, uv_names, uv_slots, vertex_arrays
+from defshade_cli.gpu.vertices import FEW_UV_SETS, in_slots, sets_of, uv_names, uv_slots, vertex_arrays
 from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
@@ -66,6 +66,7 @@ class DrawList:
     vertices: (buffer, format, attribute names) triples as moderngl takes them; indices: 32-bit.
     table: (C,) indirect commands, one draw a subset, instanced.
     corners: (C, 8, 3) of a box around what each command draws, relative to the eye; not finite where nothing is known.
+    many_uvs: vertices hold UV_SETS sets of texture coordinates, not FEW_UV_SETS.
     """
 
     vertices: tuple[tuple, ...]
@@ -74,6 +75,7 @@ class DrawList:
     corners: NDArray[np.float64]
     color_varies: bool
     textures: TextureSet
+    many_uvs: bool
 
     def vertices_of(self, program: moderngl.Program) -> list[tuple]:
         """Those of `vertices` that the program reads."""
@@ -118,7 +120,7 @@ class GpuScene:
         self._instances.write(instance_records(scene.drawables, scene.camera.position))
         names_read = uv_names(scene.drawables, scene.materials, len(scene.meshes))
         slots = uv_slots(names_read)
-        uvs = tuple(in_slots(names, slots) for names in names_read)
+        uvs, uv_sets = tuple(in_slots(names, slots) for names in names_read), sets_of(slots)
         textures = self._update_materials(scene, slots)
         color_varies = any(m.display_color is not None or m.display_opacity is not None for m in scene.meshes)
         textured = bool(textures.arrays)
@@ -136,7 +138,7 @@ class GpuScene:
         self._draws = self._replaced(self._draws, [rows, *numbers])
         positions, normals, indices, *varying = self._pool
         vertices = [(positions, "3f", "position_object"), (normals, "3f", "normal_object")]
-        names = [("4f", "vertex_color")] * color_varies + [("4f", "vertex_uv")] * textured
+        names = [("4f", "vertex_color")] * color_varies + [(f"{2 * uv_sets}f", "vertex_uv")] * textured
         names += [("2f", "vertex_layer_uv")] * layer_uv + [("16f", "vertex_primvars")] * bool(primvars)
         vertices += [(buffer, *name) for buffer, name in zip(varying, names, strict=True)]
         self._moved = self._replaced(self._moved, moved)
@@ -145,7 +147,10 @@ class GpuScene:
         vertices.append((self._draws[0], "2u4/i", "draw"))
         vertices += [(buffer, "1u4/i", "draw_row") for buffer in self._draws[1:]]
         corners = command_corners(scene)
-        return DrawList(tuple(vertices), indices, commands, corners, color_varies=color_varies, textures=textures)
+        many_uvs = uv_sets > FEW_UV_SETS
+        return DrawList(
+            tuple(vertices), indices, commands, corners, color_varies=color_varies, textures=textures, many_uvs=many_uvs
+        )
 
     def _update_materials(self, scene: Scene, slots: Mapping[str, int]) -> TextureSet:
         textures = self._textures.update(scene.textures)

@@ -16,6 +16,9 @@ log = logging.getLogger("defshade")
 
 UvNames = tuple[str, ...]
 
+FEW_UV_SETS = 2
+"""That nearly all scenes get by with."""
+
 
 def uv_names(drawables: Sequence[Drawable], materials: Sequence[Material], count: int) -> tuple[UvNames, ...]:
     """For each of `count` meshes the primvars that its materials read, each once."""
@@ -42,10 +45,15 @@ def uv_slots(names: Sequence[UvNames]) -> dict[str, int]:
     return slots
 
 
+def sets_of(slots: Mapping[str, int]) -> int:
+    """How many sets each vertex has: FEW_UV_SETS, or all where some mesh needs more."""
+    return UV_SETS if max(slots.values(), default=0) >= FEW_UV_SETS else FEW_UV_SETS
+
+
 def in_slots(names: UvNames, slots: Mapping[str, int]) -> UvNames:
     """What fills each set of a mesh; empty for nothing."""
     filled = {slots[name]: name for name in names if name in slots}
-    return tuple(filled.get(slot, "") for slot in range(UV_SETS))
+    return tuple(filled.get(slot, "") for slot in range(sets_of(slots)))
 
 
 def vertex_arrays(
@@ -66,7 +74,8 @@ def vertex_arrays(
     if color_varies:
         arrays.append(_joined([_vertex_colors(m) for m in meshes], 4))
     if textured:
-        arrays.append(_joined([_vertex_uvs(m, names) for m, names in zip(meshes, uvs, strict=True)], 2 * UV_SETS))
+        width = 2 * max(map(len, uvs), default=0)
+        arrays.append(_joined([_vertex_uvs(m, names) for m, names in zip(meshes, uvs, strict=True)], width))
     if layer_uv:
         arrays.append(_joined([_layer_uvs(m) for m in meshes], 2))
     if primvars:
@@ -90,8 +99,8 @@ def _vertex_colors(mesh: Mesh) -> NDArray[np.float32]:
 
 
 def _vertex_uvs(mesh: Mesh, names: UvNames) -> NDArray[np.float32]:
-    """(V, 4), a set in each half; 0, a primvar reader's fallback, for what the mesh lacks."""
-    uvs = np.zeros((len(mesh.points), 2 * UV_SETS), np.float32)
+    """(V, 4) or (V, 16), a set in each two; 0, a primvar reader's fallback, for what the mesh lacks."""
+    uvs = np.zeros((len(mesh.points), 2 * len(names)), np.float32)
     for number, name in enumerate(names):
         if name in mesh.uvs:
             uvs[:, 2 * number : 2 * number + 2] = mesh.uvs[name]

@@ -54,7 +54,7 @@ class GBufferVariant:
     """What the pass is compiled for.
 
     cutout: some opacity is below 1; transparent: and scales the diffuse alone; color_varies: displayColor a vertex.
-    texture_groups: 0 without textures.
+    texture_groups: 0 without textures.  many_uvs: see DrawList.
     clipping_planes: how many the camera has.
     """
 
@@ -67,12 +67,13 @@ class GBufferVariant:
     clipping_planes: int = 0
     transparent: bool = False
     orthographic: bool = False
+    many_uvs: bool = False
 
     @property
     def defines(self) -> list[str]:
         flags = ["CUTOUT"] * self.cutout + ["DISPLAY_COLOR_VARIES"] * self.color_varies
         flags += ["TRANSPARENT", "POSITION"] * self.transparent + ["ORTHOGRAPHIC"] * self.orthographic
-        flags += ["TEXTURES", "POSITION"] * bool(self.texture_groups)
+        flags += ["TEXTURES", "POSITION"] * bool(self.texture_groups) + ["MANY_UVS"] * self.many_uvs
         flags += [f"CLIPPING_PLANES {self.clipping_planes}"] * bool(self.clipping_planes)
         inputs = [name for plane in self.planes for name in plane.inputs]
         return list(dict.fromkeys([plane.define for plane in self.planes] + flags + inputs)) + space_defines(self.space)

@@ -216,6 +216,7 @@ class Pipeline:
             draws.texture_groups,
             plan.shadow_linked,
             plan.render_space,
+            draws.many_uvs,
         )
         cameras = [lit.shadow_cameras for lit in batch]
         casters = [tables.links.casts.get(lit.planned.light, ALL_LINKED) for lit in batch]
@@ -251,6 +252,7 @@ class Pipeline:
             len(plan.camera.clipping_planes),
             plan.transparent,
             plan.camera.projection == "orthographic",
+            draws.many_uvs,
         )
         self._gbuffer_pass(variant).draw(
             draws, gbuffer, self._mask, plan.camera, view["clip_from_relative"][0], whole=bool(plan.mattes)

@@ -157,11 +157,12 @@ class ShadowVariant:
     texture_groups: int
     linked: bool
     space: RenderSpace = REC709
+    many_uvs: bool = False
 
     @property
     def defines(self) -> list[str]:
         read = ["TRANSPARENT"] * self.transparent + ["DISPLAY_COLOR_VARIES"] * self.color_varies
-        read += ["TEXTURES"] * bool(self.texture_groups) + space_defines(self.space)
+        read += ["TEXTURES"] * bool(self.texture_groups) + ["MANY_UVS"] * self.many_uvs + space_defines(self.space)
         return (["CUTOUT", *read] if self.cutout else []) + ["LINKS"] * self.linked
 
 

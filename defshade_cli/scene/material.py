@@ -10,8 +10,8 @@ from defshade_cli.scene.texture import TextureInput
 
 Color = tuple[float, float, float]
 
-UV_SETS = 2
-"""Sets of texture coordinates that one material can read."""
+UV_SETS = 8
+"""Sets of texture coordinates that the materials of a mesh can read."""
 
 TEXTURED_FIELDS = (
     "diffuse_color",

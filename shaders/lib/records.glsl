@@ -53,7 +53,7 @@ struct TextureInput {
     vec4 bias;
     vec4 texture_from_uv;      // columns of the linear part
     vec2 texture_offset;
-    uint uv_set;               // 0 or 1
+    uint uv_set;               // of those that a vertex has
     uint channel;              // 0 to 3, or 4 for all
     uint field;                // of the material, numbered by generated/textures.glsl
     uint wrap_s;

@@ -1,5 +1,6 @@
 #include "lib/records.glsl"
 #include "lib/tangent.glsl"
+#include "lib/uv.glsl"
 
 layout(std430, binding = 5) readonly buffer TextureInputBlock { TextureInput texture_inputs[]; };
 layout(std430, binding = 6) readonly buffer TileBlock { Tile tiles[]; };
@@ -14,12 +15,11 @@ const uint ALL_CHANNELS = 4u;
 
 #include "generated/textures.glsl"
 
-Coordinates of_texture(TextureInput t, vec4 uv, vec4 uv_dx, vec4 uv_dy) {
+Coordinates of_texture(TextureInput t, UvSets uv, UvSets uv_dx, UvSets uv_dy) {
     mat2 linear = mat2(t.texture_from_uv);
-    bool second = t.uv_set != 0u;
-    return Coordinates(linear * (second ? uv.zw : uv.xy) + t.texture_offset,
-                       linear * (second ? uv_dx.zw : uv_dx.xy),
-                       linear * (second ? uv_dy.zw : uv_dy.xy));
+    return Coordinates(linear * set_of(uv, t.uv_set) + t.texture_offset,
+                       linear * set_of(uv_dx, t.uv_set),
+                       linear * set_of(uv_dy, t.uv_set));
 }
 
 // The arrays repeat; the other modes keep half a texel, of the mip level that is read, from the edge.
@@ -68,8 +68,8 @@ vec3 from_tangent_space(vec3 tangent_normal, vec3 n, vec3 dPdx, vec3 dPdy, Coord
 }
 
 // A material's textures in place of its constants; `normal` is turned by its normal map.
-void apply_textures(inout Material material, inout vec3 normal, vec3 position, vec4 uv) {
-    vec4 uv_dx = dFdx(uv), uv_dy = dFdy(uv);
+void apply_textures(inout Material material, inout vec3 normal, vec3 position, UvSets uv) {
+    UvSets uv_dx = along_x(uv), uv_dy = along_y(uv);
     vec3 dPdx = dFdx(position), dPdy = dFdy(position);
     for (uint i = 0u; i < material.input_count; ++i) {
         TextureInput t = texture_inputs[material.first_input + i];
@@ -81,8 +81,8 @@ void apply_textures(inout Material material, inout vec3 normal, vec3 position, v
 }
 
 // The same for what casts a shadow.
-void apply_opacity_texture(inout Material material, vec4 uv) {
-    vec4 uv_dx = dFdx(uv), uv_dy = dFdy(uv);
+void apply_opacity_texture(inout Material material, UvSets uv) {
+    UvSets uv_dx = along_x(uv), uv_dy = along_y(uv);
     for (uint i = 0u; i < material.input_count; ++i) {
         TextureInput t = texture_inputs[material.first_input + i];
         if (t.field == FIELD_OPACITY) set_field(material, t.field, read_texture(t, of_texture(t, uv, uv_dx, uv_dy)));
