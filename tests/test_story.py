@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from defshade_cli.errors import OutputError, StageError
@@ -83,3 +85,44 @@ def test_a_job_that_is_left_is_left_whole(job: RenderJob, tmp_path: Path) -> Non
         next(results)
         results.close()
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+
+
+def drawings(job: RenderJob, monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many images `run` drew; it fills as they are."""
+    drawn, draw = [], story._picture
+
+    def counted(*given):  # type: ignore[no-untyped-def]
+        drawn.append(1)
+        return draw(*given)
+
+    monkeypatch.setattr(story, "_picture", counted)
+    return drawn
+
+
+def test_a_stage_in_which_nothing_moves_is_drawn_once(job: RenderJob, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And its other frames hold what they hold when they are drawn alone."""
+    counted = drawings(job, monkeypatch)
+    paths = [path for result in run(job) for path in result.paths]
+    assert len(counted) == 1
+    assert [path.name for path in paths] == ["f.1.exr", "f.2.exr", "f.3.exr"]
+    (alone,) = run(replace(job, frames=(2.0,), output=OutputSettings((str(paths[0].with_name("alone.exr")),))))
+    np.testing.assert_array_equal(read(paths[1])["beauty"], read(alone.paths[0])["beauty"])
+
+
+MOVING = STAGE.replace('ball" {}', 'ball" {\n double radius.timeSamples = { 1: 1, 3: 2 }\n}')
+
+
+@pytest.mark.parametrize(
+    ("text", "settings"),
+    [
+        (MOVING, RenderSettings(size=(16, 9))),
+        (STAGE, RenderSettings(size=(16, 9), turntable=3)),
+        (STAGE, RenderSettings(size=(16, 9), layers=("beauty", "motionForward"))),
+    ],
+)
+def test_what_may_move_is_drawn_anew(
+    text: str, settings: RenderSettings, job: RenderJob, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job.stage.write_text(text)
+    counted = drawings(job, monkeypatch)
+    assert len(list(run(replace(job, settings=settings)))) == len(counted) == 3

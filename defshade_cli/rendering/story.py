@@ -24,6 +24,7 @@ from defshade_cli.rendering.pictures import shown
 from defshade_cli.rendering.renderer import Renderer
 from defshade_cli.rendering.results import FrameResult, ImageResult
 from defshade_cli.rendering.soundness import sound
+from defshade_cli.rendering.stills import Picture, Stills
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Composition, OutputSettings, RenderJob, RenderSettings
 from defshade_cli.usd.reader import StageReader
@@ -135,8 +136,10 @@ def render(
 def _drawn_frames(
     opened: OpenJob, shots: dict[float | None, list[Shot]], renderer: Renderer, command: str, startup: dict[str, float]
 ) -> Iterator[_DrawnFrame]:
+    stills = Stills()
     for frame in opened.frames:
-        yield _DrawnFrame(frame, tuple(_draw(shot, opened, renderer, command) for shot in shots[frame]), startup)
+        images = tuple(_draw(shot, opened, renderer, command, stills) for shot in shots[frame])
+        yield _DrawnFrame(frame, images, startup)
         startup = {}
 
 
@@ -159,7 +162,7 @@ def _written_behind(frames: Iterator[_DrawnFrame]) -> Generator[FrameResult, Non
         raise failure
 
 
-def _draw(shot: Shot, opened: OpenJob, renderer: Renderer, command: str) -> _Drawn | ImageResult:
+def _draw(shot: Shot, opened: OpenJob, renderer: Renderer, command: str, stills: Stills) -> _Drawn | ImageResult:
     job, files = shot.job, shot_files(shot)
     made_of = opened.fingerprint(shot) if files else ""
     if is_done(job, files, made_of):
@@ -168,6 +171,21 @@ def _draw(shot: Shot, opened: OpenJob, renderer: Renderer, command: str) -> _Dra
     reader = opened.reader(shot.product)
     with _timed(seconds, "read"):
         scene = reader.read(shot.frame)
+    picture = stills.find(shot, scene)
+    if picture is None:
+        picture = _picture(shot, scene, reader, renderer, seconds)
+        if reader.is_still:
+            stills.keep(shot, scene, picture)
+    film, plan = replace(picture.film, frame=shot.frame), picture.plan
+    facts = _provenance(shot, scene, command) | film.metadata | _cost(plan, seconds.get("draw", 0.0))
+    if not picture.fault:
+        facts |= {FINGERPRINT: made_of}
+    fault = picture.fault if job.output.on_nan == "error" else ""
+    return _Drawn(shot, replace(film, metadata=facts), plan, seconds, fault)
+
+
+def _picture(shot: Shot, scene: Scene, reader: StageReader, renderer: Renderer, seconds: dict[str, float]) -> Picture:
+    job = shot.job
     with _timed(seconds, "plan"):
         plan = make_plan(scene, job.settings)
     with _timed(seconds, "context"):
@@ -179,12 +197,7 @@ def _draw(shot: Shot, opened: OpenJob, renderer: Renderer, command: str) -> _Dra
     with _timed(seconds, "check"):
         checked = sound(film, scene, job.settings, pipeline, job.output.on_nan)
     with _timed(seconds, "show"):
-        film = shown(checked.film, shot, renderer)
-    facts = _provenance(shot, scene, command) | film.metadata | _cost(plan, seconds["draw"])
-    if not checked.fault:
-        facts |= {FINGERPRINT: made_of}
-    fault = checked.fault if job.output.on_nan == "error" else ""
-    return _Drawn(shot, replace(film, metadata=facts), plan, seconds, fault)
+        return Picture(shown(checked.film, shot, renderer), plan, checked.fault)
 
 
 def _moments(scene: Scene, plan: Plan, reader: StageReader, settings: RenderSettings) -> Iterator[ShutterSample]:

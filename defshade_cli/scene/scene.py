@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import numpy as np
@@ -79,6 +79,11 @@ class Scene:
         """(D, 2, 3) world-space box around all placements of each drawable; (+inf, −inf) around none."""
         boxes = [world_boxes(self.meshes[d.mesh].bounds, d.world_from_object) for d in self.drawables]
         return np.array([enclose([box]) for box in boxes]).reshape(-1, 2, 3)
+
+    def is_still(self, before: Scene) -> bool:
+        """Is all of it the very objects of `before`, but for the frame?"""
+        kept = (f.name for f in fields(self) if f.name != "frame")
+        return all(getattr(self, name) is getattr(before, name) for name in kept)
 
     @property
     def light_linked(self) -> bool:

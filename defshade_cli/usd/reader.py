@@ -89,6 +89,7 @@ class StageReader:
         self._settings = read_settings(stage, render_settings, product)
         self._stage, self._purposes = stage, tuple(self._settings.purposes if purposes is None else purposes)
         self._levels: dict[str, int] = {}
+        self._still: Scene | None = None
         self._lights: dict[str, Light] = {}
         self._pass = read_pass(stage, render_settings)
         self._cameras = find_cameras(stage)
@@ -113,6 +114,8 @@ class StageReader:
         A frame in which everything is hidden for a while has no drawables. Raises EmptyStage where there is nothing
         to draw at any time, StageError for a camera that sees nothing.
         """
+        if self._still:
+            return replace(self._still, frame=frame)
         time = Usd.TimeCode.Default() if frame is None else Usd.TimeCode(frame)
         with facts.gathered_diagnostics():
             levels = self._levels = {}
@@ -120,7 +123,9 @@ class StageReader:
             if self._extras.motion and frame is not None:
                 neighbours = tuple(self._moment(scene, frame + step, levels) for step in (-1.0, 1.0))
                 scene = replace(scene, neighbours=neighbours)
-        return self._lit(scene)
+        scene = self._lit(scene)
+        self._still = scene if self.is_still else None
+        return scene
 
     def read_shutter(self, scene: Scene, count: int) -> Iterator[Scene]:
         """The frame of `scene` again and again, at `count` times of its shutter in turn, without end.
@@ -182,6 +187,12 @@ class StageReader:
             purposes=self._purposes,
             rendering_space=self._settings.rendering_space,
         )
+
+    @cached_property
+    def is_still(self) -> bool:
+        """Is every frame like the first? The neighbours that motion asks for are read with their frame."""
+        turns = self._framing is not None and self._framing.turn is not None
+        return not (turns or self._extras.motion or self._may_change)
 
     @cached_property
     def _may_change(self) -> bool:
