@@ -49,6 +49,14 @@ def areas(corners: NDArray[np.float64]) -> NDArray[np.float64]:
 # Sampling
 
 
+def test_its_spread_holds_all_of_the_surface() -> None:
+    """So that several points stand for it at one sample, which its far field cannot."""
+    light = mesh_light(corners_of_ball(0.5), world_from_light=at(0, 0, 3) @ np.diag([2.0, 1.0, 1.0, 1.0]))
+    assert light.spread == pytest.approx(1.0, rel=1e-3)
+    of = scene([ball(1.0)], [light], [WHITE])
+    assert make_plan(of, RenderSettings(size=(8, 8))).lights[0].points == 16
+
+
 @pytest.mark.parametrize("placed", [np.eye(4), at(1, 2, 3) @ rotated("x", 40.0) @ np.diag([2.0, 0.5, -3.0, 1.0])])
 def test_points_carry_the_light_of_the_whole_surface(placed: NDArray[np.float64]) -> None:
     """The mean of what 3200 points stand for is ∫ L dA, and of their places ∫ L x dA: stretched, mirrored, tinted."""

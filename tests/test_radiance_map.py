@@ -11,7 +11,9 @@ import pytest
 from build import at, quad, scene
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.light_texture import with_texture
+from defshade_cli.passes.emitters import light_batches
 from defshade_cli.passes.pipeline import Pipeline
+from defshade_cli.passes.sampling import samples as lit_samples
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.emission import emitter_at
 from defshade_cli.scene.light import RectLight
@@ -91,6 +93,19 @@ def test_an_image_lights_what_each_of_its_halves_lights(gpu: Gpu) -> None:
         images.append(pipeline.render(of, plan).layers["beauty"][..., :3])
     np.testing.assert_allclose(images[0], images[1], rtol=0.05, atol=0.02)
     assert images[0][16, 28, 0] > 2 * images[0][16, 28, 2], "red at +X"
+
+
+@pytest.mark.parametrize("samples", [1, 16])
+def test_few_points_have_the_colour_of_the_whole_image(samples: int) -> None:
+    """All of a render together, however they fall on a small blue pane."""
+    image = np.full((4, 4, 3), (1.0, 0.9, 0.2), np.float32)
+    image[3, :2] = (0, 0, 4)
+    light = panel(radiance_map=RadianceMap(image), normalize=True)
+    of = scene([quad(5.0)], [light], [WHITE])
+    plan = make_plan(of, RenderSettings(size=(8, 8), samples=samples))
+    batches = [batch for sample in lit_samples(samples) for batch in light_batches(of, plan, sample)]
+    total = sum(lit.emitter.intensity for batch in batches for lit in batch) / samples
+    np.testing.assert_allclose(total, light.emission, rtol=1e-6)
 
 
 def test_an_image_is_read_from_a_stage(tmp_path: Path) -> None:

@@ -17,9 +17,10 @@ from defshade_cli.image.light_texture import with_texture
 from defshade_cli.measure.mitsuba_plugins import mi
 from defshade_cli.scene.light import CylinderLight, DiskLight, DistantLight, DomeLight, Light, RectLight, SphereLight
 from defshade_cli.scene.mesh_light import MeshLight
-from defshade_cli.spaces import Matrix, rigid, transform_points
+from defshade_cli.spaces import Matrix, normalize, rigid, transform_points
 
 _FAR = 1e4  # distance of a distant light's disk over the scene's radius
+_HAIR = 1e-4  # between a mesh light and the surface that it is, over the scene's radius
 _TURNED = np.diag([1.0, -1.0, -1.0, 1.0])  # Mitsuba's flat shapes face +Z, USD's lights −Z
 _FINER = 4  # Mitsuba interpolates a sky's pixels, which finer ones leave as flat as they are here
 
@@ -32,7 +33,7 @@ def emitter(light: Light, centre: NDArray[np.float64], radius: float) -> Any:
         case DomeLight():
             return _sky(light)
         case MeshLight():
-            return _glowing_mesh(light)
+            return _glowing_mesh(light, radius)
     if light.size_factor == 0.0 or (isinstance(light, SphereLight) and light.treat_as_point):
         if light.shaping or light.profile != "uniform":
             raise DefshadeError(f"{light.path}: path tracing takes no shaped light without a size")
@@ -62,10 +63,13 @@ def _sky(light: DomeLight) -> dict[str, Any]:
     return {"type": "envmap", "bitmap": mi.Bitmap(texels), "to_world": frame, "scale": 1.0}
 
 
-def _glowing_mesh(light: MeshLight) -> Any:
+def _glowing_mesh(light: MeshLight, radius: float) -> Any:
+    """A surface that lets light pass a hair before the one that is drawn: rays towards both would hit either."""
     if light.shaping or np.ptp(light.tints, axis=0).any():
         raise DefshadeError(f"{light.path}: path tracing takes even mesh lights without shaping only")
-    points = transform_points(light.world_from_light, light.corners.reshape(-1, 3))
+    corners = transform_points(light.world_from_light, light.corners.reshape(-1, 3)).reshape(-1, 3, 3)
+    a, b, c = corners.transpose(1, 0, 2)
+    points = (corners + normalize(np.cross(b - a, c - a))[:, None] * (_HAIR * radius)).reshape(-1, 3)
     props = mi.Properties()
     props["bsdf"] = mi.load_dict({"type": "null"})
     props["emitter"] = mi.load_dict({"type": "area", "radiance": rgb(light.radiance)})

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.image.environment import sky_of
-from defshade_cli.passes.sampling import Sample
+from defshade_cli.passes.sampling import Sample, samples
 from defshade_cli.passes.shadows import CAPACITY, ShadowExtent, shadow_cameras
 from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.emission import Emitter, emitter_at, far_field, sky_emitter
-from defshade_cli.scene.light import DomeLight
+from defshade_cli.scene.light import DomeLight, RectLight
 from defshade_cli.scene.mesh_light import MeshLight
+from defshade_cli.scene.radiance_map import RadianceMap
 from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import Window
 
@@ -56,17 +58,26 @@ def _emitters(number: int, planned: PlannedLight, plan: Plan, sample: Sample, ex
     if isinstance(light, DomeLight):
         if plan.samples == 1:
             return []
-        places = (sample.on_light(number, k, DOME_DIRECTIONS) for k in range(DOME_DIRECTIONS))
+        places = [sample.on_light(number, k, DOME_DIRECTIONS) for k in range(DOME_DIRECTIONS)]
         directions = [sky_emitter(light, sky_of(light), u[:2], 1.0 / DOME_DIRECTIONS) for u in places]
         return [direction.shared_by(plan.samples) for direction in directions]
     if plan.samples * planned.points == 1:
         return [far_field(light)]
     towards = extent.receivers.mean(axis=0) + plan.camera.position
-    points = [
-        emitter_at(light, sample.on_light(number, k, planned.points), towards, inside=planned.is_empty)
-        for k in range(planned.points)
-    ]
+    places = [sample.on_light(number, k, planned.points) for k in range(planned.points)]
+    points = [emitter_at(light, u, towards, inside=planned.is_empty) for u in places]
+    if isinstance(light, RectLight) and light.radiance_map:
+        mean = _mean_weight(light.radiance_map, number, planned.points, plan.samples)
+        points = [replace(point, intensity=point.intensity / mean) for point in points]
     return [point.one_of(planned.points).shared_by(plan.samples) for point in points]
+
+
+@lru_cache(maxsize=16)
+def _mean_weight(shown: RadianceMap, number: int, points: int, count: int) -> NDArray[np.float64]:
+    """(3,) of all points of an image in `count` samples; divided by it, few points have its colour as a whole."""
+    drawn = [shown.sample(s.on_light(number, k, points)[:2])[1] for s in samples(count) for k in range(points)]
+    mean = np.mean(drawn, axis=0)
+    return np.where(mean > 0.0, mean, 1.0)
 
 
 def shadow_extent(bounds: NDArray[np.float64], plan: Plan) -> ShadowExtent:

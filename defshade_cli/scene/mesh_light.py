@@ -52,6 +52,11 @@ class MeshLight(Light):
         centroid = weights @ self.corners.mean(axis=1) / weights.sum()
         return transform_points(self.world_from_light, centroid)
 
+    @property
+    def spread(self) -> float:
+        corners = transform_points(self.world_from_light, self.corners.reshape(-1, 3))
+        return float(np.linalg.norm(corners - self.position, axis=1).max(initial=0.0))
+
     def draw(self, u: tuple[float, float]) -> tuple[Vector, Vector, float, Vector]:
         """A point of the surface in light space, its unit normal, the area that it stands for, and its weight (3,).
 
