@@ -63,6 +63,23 @@ def triangle(name: str = "mesh", joint: int = 1, interpolation: str = "constant"
     """
 
 
+def shape(name: str, offsets: str, extra: str = "") -> str:
+    return f'def BlendShape "{name}" {{\nuniform vector3f[] offsets = {offsets}\n{extra}\n}}\n'
+
+
+def moulded(weights: str, *shapes: str, names: tuple[str, ...] = ("up",)) -> str:
+    """A triangle without joints whose blend shapes have weights."""
+    targets = ", ".join(f"<{name}>" for name in names)
+    order = ", ".join(f'"{name}"' for name in names)
+    bound = f"uniform token[] skel:blendShapes = [{order}]\nrel skel:blendShapeTargets = [{targets}]\n" + "".join(
+        shapes
+    )
+    mesh = triangle(extra=bound)
+    mesh = mesh[: mesh.index("int[] primvars")] + mesh[mesh.index("uniform token[] skel:blendShapes") :]
+    source = f"uniform token[] blendShapes = [{order}]\nfloat[] blendShapeWeights = {weights}"
+    return rig(animation("anim", (0, 0), extra=source) + mesh, "anim")
+
+
 def rig(body: str, source: str = "", kind: str = "SkelRoot", name: str = "rig") -> str:
     """A SkelRoot with the skeleton, which `source` animates, and `body`."""
     bound = f"rel skel:animationSource = <../{source}>" if source else ""

@@ -13,7 +13,7 @@ from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.skel.influences import Influences
 from defshade_cli.usd.skel.skinning import DualQuaternionBlend, LinearBlend
 from defshade_cli.usd.stage import open_stage
-from rigs import animation, rig, triangle, world_points
+from rigs import animation, moulded, rig, shape, triangle, world_points
 from stages import instance, move, read, reasons, stage_of
 
 METHODS = {"classicLinear": LinearBlend, "dualQuaternion": DualQuaternionBlend}
@@ -267,28 +267,11 @@ def test_a_skeleton_above_instances_moves_each() -> None:
 # Blend shapes
 
 
-def _shape(name: str, offsets: str, extra: str = "") -> str:
-    return f'def BlendShape "{name}" {{\nuniform vector3f[] offsets = {offsets}\n{extra}\n}}\n'
-
-
-def _moulded(weights: str, *shapes: str, names: tuple[str, ...] = ("up",)) -> str:
-    """A triangle without joints whose blend shapes have weights."""
-    targets = ", ".join(f"<{name}>" for name in names)
-    order = ", ".join(f'"{name}"' for name in names)
-    bound = f"uniform token[] skel:blendShapes = [{order}]\nrel skel:blendShapeTargets = [{targets}]\n" + "".join(
-        shapes
-    )
-    mesh = triangle(extra=bound)
-    mesh = mesh[: mesh.index("int[] primvars")] + mesh[mesh.index("uniform token[] skel:blendShapes") :]
-    source = f"uniform token[] blendShapes = [{order}]\nfloat[] blendShapeWeights = {weights}"
-    return rig(animation("anim", (0, 0), extra=source) + mesh, "anim")
-
-
 def test_blend_shapes_add_up() -> None:
-    text = _moulded(
+    text = moulded(
         "[0.5, 2]",
-        _shape("up", "[(0, 2, 0), (0, 2, 0), (0, 2, 0)]"),
-        _shape("out", "[(0, 0, 3)]", "uniform int[] pointIndices = [1]"),
+        shape("up", "[(0, 2, 0), (0, 2, 0), (0, 2, 0)]"),
+        shape("out", "[(0, 0, 3)]", "uniform int[] pointIndices = [1]"),
         names=("up", "out"),
     )
     np.testing.assert_allclose(world_points(read(text))["/rig/mesh"], [(0, 3, 0), (1, 3, 6), (0, 4, 0)], atol=1e-6)
@@ -298,14 +281,14 @@ def test_blend_shapes_add_up() -> None:
 def test_inbetweens_are_passed_on_the_way(weight: float, height: float) -> None:
     """From 0 to 3 at half the weight, then to 2; below 0 the nearest two shapes are continued."""
     inbetween = "uniform vector3f[] inbetweens:half = [(0, 3, 0), (0, 3, 0), (0, 3, 0)] (\nweight = 0.5\n)"
-    text = _moulded(f"[{weight}]", _shape("up", "[(0, 2, 0), (0, 2, 0), (0, 2, 0)]", inbetween))
+    text = moulded(f"[{weight}]", shape("up", "[(0, 2, 0), (0, 2, 0), (0, 2, 0)]", inbetween))
     np.testing.assert_allclose(world_points(read(text))["/rig/mesh"][0], (0, 2 + height, 0), atol=1e-6)
 
 
 def test_normal_offsets_turn_normals() -> None:
     normals = "normal3f[] normals = [(0, 0, 1), (0, 0, 1), (0, 0, 1)]"
     offsets = "uniform vector3f[] normalOffsets = [(1, 0, 0), (0, 0, 0), (1, 0, -1)]"
-    text = _moulded("[1]", _shape("up", "[(0, 2, 0), (0, 2, 0), (0, 2, 0)]", offsets))
+    text = moulded("[1]", shape("up", "[(0, 2, 0), (0, 2, 0), (0, 2, 0)]", offsets))
     text = text.replace("point3f[] points", f"{normals}\npoint3f[] points")
     expected = [(0.5**0.5, 0, 0.5**0.5), (0, 0, 1), (1, 0, 0)]
     np.testing.assert_allclose(read(text).meshes[0].normals, expected, atol=1e-6)
@@ -323,7 +306,7 @@ def test_normal_offsets_turn_normals() -> None:
         ("uniform matrix4d[] bindTransforms", "uniform matrix4d[] other", "its skeleton has no bind or rest pose"),
     ],
 )
-def test_a_broken_binding_leaves_the_rest_shape(before: str, after: str, reason: str) -> None:
+def test_a_broken_binding_leaves_the_restshape(before: str, after: str, reason: str) -> None:
     text = rig(animation("anim", (0, 90)) + triangle(interpolation="vertex"), "anim")
     assert before in text
     scene = read(text.replace(before, after))
@@ -332,15 +315,6 @@ def test_a_broken_binding_leaves_the_rest_shape(before: str, after: str, reason:
 
 
 def test_a_blend_shape_that_does_not_fit_is_left_out() -> None:
-    scene = read(_moulded("[1]", _shape("up", "[(0, 2, 0)]")))
+    scene = read(moulded("[1]", shape("up", "[(0, 2, 0)]")))
     np.testing.assert_allclose(world_points(scene)["/rig/mesh"][0], (0, 2, 0))
     assert reasons(scene, "/rig/mesh") == ["blend shape up is left out: 1 offsets where 3 are due"]
-
-
-def test_only_meshes_bend() -> None:
-    curves = triangle(interpolation="vertex").replace("def Mesh", "def BasisCurves")
-    curves = curves.replace(
-        "int[] faceVertexCounts = [3]", 'int[] curveVertexCounts = [3]\nuniform token type = "linear"'
-    )
-    scene = read(rig(animation("anim", (0, 90)) + curves, "anim"))
-    assert "drawn in its rest shape: only a mesh is bent by a skeleton" in reasons(scene, "/rig/mesh")

@@ -54,6 +54,17 @@ class Kind:
         fits = closed_fits if self.closed else open_fits
         return np.where(fits, np.maximum(found, 0), 0)
 
+    def elements(self, counts: NDArray[np.int64], points: int) -> dict[str, int]:
+        """How many values each interpolation needs on curves of so many points each."""
+        varying = int((self.segments(counts) + (0 if self.closed else 1)).sum())
+        return {
+            "constant": 1,
+            "uniform": len(counts),
+            "vertex": points,
+            "varying": varying,
+            "faceVarying": varying,
+        }
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CurveSamples:
@@ -61,15 +72,12 @@ class CurveSamples:
 
     curve: (S,) the authored curve of each, ascending.  closed: whether a curve's last sample is followed by its first.
     vertex, varying: (S, points) and (S, varying values) weights.
-    elements: how many values each interpolation needs.  left_out: curves that have too few points.
     """
 
     curve: NDArray[np.intp]
     closed: bool
     vertex: Weights
     varying: Weights
-    elements: dict[str, int]
-    left_out: int
 
     @property
     def count(self) -> int:
@@ -109,17 +117,12 @@ class Places(NamedTuple):
 
 
 def sample_at(kind: Kind, counts: NDArray[np.int64], points: int, places: Places) -> CurveSamples:
-    segments = kind.segments(counts)
-    varying_counts = segments + (0 if kind.closed else 1)
-    elements = {"constant": 1, "uniform": len(counts), "vertex": points}
-    varying = int(varying_counts.sum())
+    varying_counts = kind.segments(counts) + (0 if kind.closed else 1)
     return CurveSamples(
         places.curve,
         kind.closed,
         _vertex_weights(kind, counts, points, places, _powers(kind, places.t) @ _BASES[kind.basis][1].T),
         _varying_weights(kind, varying_counts, places),
-        elements | {"varying": varying, "faceVarying": varying},
-        int(np.count_nonzero(segments == 0)),
     )
 
 

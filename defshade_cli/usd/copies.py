@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 class Copies:
     """Where a prim places its one shape N times.
 
-    object_from_copy: (N, 4, 4) float64.  ids: (N,) int32.
+    object_from_copy: (N, 4, 4) float64.  ids: (N,) int32, which they are of those `authored`.
     display_color, display_opacity: (N, 3) and (N,) float32, NaN where nothing is authored.
     """
 
@@ -21,6 +21,17 @@ class Copies:
     ids: NDArray[np.int32]
     display_color: NDArray[np.float32]
     display_opacity: NDArray[np.float32]
+    authored: int = 1
+
+    @property
+    def positions(self) -> NDArray[np.float32]:
+        """(N, 3)"""
+        return self.object_from_copy[:, :3, 3].astype(np.float32)
+
+    def moved(self, positions: NDArray[np.float32]) -> Copies:
+        matrices = self.object_from_copy.copy()
+        matrices[:, :3, 3] = positions
+        return replace(self, object_from_copy=matrices)
 
 
 def once(display_color: NDArray[np.float32] | None = None, display_opacity: float | None = None) -> Copies:

@@ -44,6 +44,7 @@ from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.small_meshes import Shaped
 from defshade_cli.usd.strands import Strands
 from defshade_cli.usd.subsets import FaceGroup, Faces, material_subsets, read_faces
+from defshade_cli.usd.sweep import swept
 
 __all__ = ["FaceGroup", "Gprim", "Surface", "is_time_varying", "read_surface", "tessellate"]
 
@@ -60,7 +61,7 @@ class Surface:
         varies and lies on the polygons. display_opacity likewise.
     groups: paths of the material groups that have faces to draw, in order.
     issues: what was left out or mended of this prim, and why.
-    strands: of curves that may face the image, which then counts in place of the polygons.
+    strands: of curves, from which the polygons follow, or others that face the image.
     """
 
     path: str
@@ -241,8 +242,8 @@ def _read_shape(
     if prim.IsA(UsdGeom.Points):
         return _Shape(*read_points(UsdGeom.Points(prim), time, issues, color, as_disks=as_cages))
     if prim.IsA(UsdGeom.BasisCurves):
-        polygons, strands = read_curves(UsdGeom.BasisCurves(prim), time, issues, color)
-        return _Shape(polygons, strands=strands if as_cages or strands.widths is None else None)
+        strands = read_curves(UsdGeom.BasisCurves(prim), time, issues, color)
+        return _Shape(swept(strands), strands=strands)
     if prim.IsA(UsdGeom.NurbsPatch):
         return _Shape(read_patch(UsdGeom.NurbsPatch(prim), time, issues, color))
     return _Shape()

@@ -78,6 +78,7 @@ def _copies(
         np.arange(count, dtype=np.int32)[drawn],
         np.broadcast_to(np.float32(np.nan) if color is None else color.values, (count, 3))[drawn],
         np.broadcast_to(np.float32(np.nan) if opacity is None else opacity.values, (count,))[drawn],
+        count,
     )
 
 

@@ -51,8 +51,8 @@ class Strands:
     """Curves before they are sampled.
 
     counts: (K,) control points of each curve, all there.  points: (P, 3) float32, finite.
-    widths, carried: fit the kind's elements, widths None where none do.
-    oriented: normals are authored, so that only lines face the image.
+    widths, normals, carried: fit the kind's elements; None where none are authored that do.  Curves with normals are
+        ribbons that lie as these say.
     loops: the wrap is authored as periodic; lines are closed even where no number of segments closes the curves.
     """
 
@@ -60,15 +60,15 @@ class Strands:
     counts: NDArray[np.int64]
     points: NDArray[np.float32]
     widths: Primvar | None
+    normals: Primvar | None
     carried: Carried
-    oriented: bool
     loops: bool
 
     def face_at(self, level: int | None) -> bool:
         """Whether they face the image at a level of refinement, None for what they are from all sides."""
         if self.widths is None or level is None:
             return self.widths is None
-        return level == 0 or (level < TUBE_LEVEL and not self.oriented)
+        return level == 0 or (level < TUBE_LEVEL and self.normals is None)
 
     def facing(self, camera_from_object: Matrix, view: View, level: int | None) -> Polygons:
         """The pieces in camera space, of strands that face the image."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,21 +15,35 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 
+class Offsets(NamedTuple):
+    """(P, 3) what is added to points and to normals. silent: to points, by shapes that say nothing of normals."""
+
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    silent: NDArray[np.float64]
+
+    def of(self, rows: NDArray[np.integer] | None) -> Offsets:
+        """Of some points; None for all."""
+        return self if rows is None else Offsets(*(offsets[rows] for offsets in self))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class BlendShapes:
     """The shapes of P points.
 
     points, normals: (3P, S) offsets of each sub-shape, that is of a shape or of an inbetween at its full weight.
+    silent: (S,) those without offsets of normals.
     """
 
     query: UsdSkel.BlendShapeQuery
     points: csr_matrix
     normals: csr_matrix
+    silent: NDArray[np.bool_]
 
-    def offsets(self, weights: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(P, 3) what is added to points and to normals."""
+    def offsets(self, weights: NDArray[np.float32]) -> Offsets:
         amounts = self._amounts(weights)
-        return (self.points @ amounts).reshape(-1, 3), (self.normals @ amounts).reshape(-1, 3)
+        added = (self.points @ amounts, self.normals @ amounts, self.points @ (amounts * self.silent))
+        return Offsets(*(offsets.reshape(-1, 3) for offsets in added))
 
     def _amounts(self, weights: NDArray[np.float32]) -> NDArray[np.float64]:
         """(S,) weights of sub-shapes: USD finds the two inbetweens that a weight lies between."""
@@ -50,7 +64,8 @@ def read_blend_shapes(binding: UsdSkel.BindingAPI, points: int, issues: list[str
         moved.append(_entries(offsets, indices[shape], points, name, issues))
         normals = _normal_offsets(query, sub_shape) if len(offsets) else None
         turned.append(_entries(normals, indices[shape], points, f"{name}: normalOffsets", issues))
-    return BlendShapes(query, _stacked(moved, points), _stacked(turned, points))
+    silent = np.array([not len(offsets) for _, offsets in turned], bool)
+    return BlendShapes(query, _stacked(moved, points), _stacked(turned, points), silent)
 
 
 Entries = tuple[NDArray[np.integer], NDArray[np.float32]]

@@ -16,9 +16,11 @@ from defshade_cli.spaces import Matrix
 from defshade_cli.usd.geometry import Surface
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.skel.animation import Animation, Pose
-from defshade_cli.usd.skel.blendshapes import BlendShapes, read_blend_shapes
+from defshade_cli.usd.skel.blendshapes import BlendShapes, Offsets, read_blend_shapes
+from defshade_cli.usd.skel.body import Body, body_of, with_body
 from defshade_cli.usd.skel.influences import Influences, read_influences
 from defshade_cli.usd.skel.skinning import DualQuaternionBlend, LinearBlend, Skinning, inverse_transposes
+from defshade_cli.usd.skel.transport import transported
 from defshade_cli.usd.xform import matrix
 
 T = TypeVar("T")
@@ -48,7 +50,8 @@ class Deformer:
     def __init__(self, skinning: UsdSkel.SkinningQuery, query: UsdSkel.SkeletonQuery, skeleton: Usd.Prim) -> None:
         self.skeleton = skeleton
         self._skinning, self._animation = skinning, Animation(skinning, query)
-        self._bends = skinning.GetPrim().IsA(UsdGeom.Mesh)
+        prim = skinning.GetPrim()
+        self._bends = prim.IsA(UsdGeom.Mesh) or prim.IsA(UsdGeom.BasisCurves) or prim.IsA(UsdGeom.Points)
         self._shapes = _Remembered[tuple[BlendShapes, tuple[str, ...]]]()
         self._influences = _Remembered[Influences]()
         self._surface = _Remembered[Surface]()
@@ -65,8 +68,8 @@ class Deformer:
             return Deformed(self._posed(rest, pose), None)
         is_rigid = self._skinning.IsRigidlyDeformed()
         if not (is_rigid or self._bends):
-            raise ValueError("only a mesh is bent by a skeleton")
-        influences = self._read_influences(pose, len(rest.polygons.points), time)
+            raise ValueError("only meshes, curves and points are bent by a skeleton")
+        influences = self._read_influences(pose, body_of(rest).authored, time)
         dual = self._skinning.GetSkinningMethod() == UsdSkel.Tokens.dualQuaternion
         skinning = DualQuaternionBlend(pose.joints) if dual else LinearBlend(pose.joints)
         bind = matrix(self._skinning.GetGeomBindTransform(time))
@@ -78,30 +81,28 @@ class Deformer:
         """Moulded by blend shapes, then bent."""
 
         def deform() -> Surface:
-            polygons, issues = self._moulded(rest.polygons, pose)
-            polygons = bent(polygons, *skin) if skin else polygons
-            if not np.isfinite(polygons.bounds).all():
-                raise ValueError("its deformed points are not finite")
-            return self._renamed(rest, polygons, issues)
+            body = body_of(rest)
+            polygons, issues = self._moulded(body, pose)
+            polygons = bent(polygons, *_of_rows(skin, body.rows)) if skin else polygons
+            return self._renamed(with_body(rest, polygons), issues)
 
         bind = skin[2].tobytes() if skin else b""
         return self._surface.of((rest, pose.key, skin and skin[1], bind), deform)
 
-    def _moulded(self, polygons: Polygons, pose: Pose) -> tuple[Polygons, tuple[str, ...]]:
+    def _moulded(self, body: Body, pose: Pose) -> tuple[Polygons, tuple[str, ...]]:
         if not (self._bends and self._skinning.HasBlendShapes()):
-            return polygons, ()
-        count = len(polygons.points)
-        shapes, issues = self._shapes.of(count, lambda: self._read_shapes(count))
-        return moulded(polygons, *shapes.offsets(pose.weights)), issues
+            return body.polygons, ()
+        shapes, issues = self._shapes.of(body.authored, lambda: self._read_shapes(body.authored))
+        return moulded(body.polygons, shapes.offsets(pose.weights).of(body.rows)), issues
 
     def _at_rest(self, rest: Surface, reason: str) -> Surface:
         issues = (f"drawn in its rest shape: {reason}",)
-        return self._surface.of((rest, reason), lambda: self._renamed(rest, rest.polygons, issues))
+        return self._surface.of((rest, reason), lambda: self._renamed(rest, issues))
 
-    def _renamed(self, rest: Surface, polygons: Polygons, issues: tuple[str, ...]) -> Surface:
+    def _renamed(self, surface: Surface, issues: tuple[str, ...]) -> Surface:
         path = str(self._skinning.GetPrim().GetPath())
         found = tuple(Unsupported(path, issue) for issue in issues)
-        return replace(rest, path=path, polygons=polygons, issues=rest.issues + found)
+        return replace(surface, path=path, issues=surface.issues + found)
 
     def _read_influences(self, pose: Pose, points: int, time: Usd.TimeCode) -> Influences:
         primvars = self._skinning.GetJointIndicesPrimvar(), self._skinning.GetJointWeightsPrimvar()
@@ -127,15 +128,24 @@ class _Remembered(Generic[T]):
         return self._last[1]
 
 
-def moulded(polygons: Polygons, points: NDArray[np.float64], normals: NDArray[np.float64]) -> Polygons:
-    """Polygons with offsets (P, 3) added to their points, and others to their normals."""
-    moved = replace(polygons, points=(polygons.points + points).astype(np.float32))
-    if moved.normals is None or not normals.any():
+def _of_rows(skin: Skin, rows: NDArray[np.integer] | None) -> Skin:
+    skinning, influences, bind = skin
+    return skinning, influences if rows is None else influences.of(rows), bind
+
+
+def moulded(polygons: Polygons, offsets: Offsets) -> Polygons:
+    """Polygons with offsets added to their points and normals; normals follow the shapes that say nothing of them."""
+    moved = replace(polygons, points=(polygons.points + offsets.points).astype(np.float32))
+    if moved.normals is None:
+        return moved
+    if offsets.silent.any() and len(polygons.counts):
+        moved = replace(moved, normals=transported(polygons, (polygons.points + offsets.silent).astype(np.float32)))
+    if moved.normals is None or not offsets.normals.any():
         return moved
     at_elements = _rows(moved.normals, moved)
     if at_elements is None:
         return replace(moved, normals=None)
-    turned = moved.normals.values + normals[at_elements]
+    turned = moved.normals.values + offsets.normals[at_elements]
     return replace(moved, normals=replace(moved.normals, values=_unit(turned)))
 
 
