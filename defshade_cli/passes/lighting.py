@@ -7,37 +7,24 @@ plane would cut off.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import moderngl
-import numpy as np
-from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import DEPTH_CLAMP, Gpu
 from defshade_cli.gpu.outputs import output_defines, outputs_source
 from defshade_cli.gpu.planes import Plane, read_source, uses_standard_depth
-from defshade_cli.gpu.records import record
 from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.light_targets import LightTargets
-from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.screen import Screen
 from defshade_cli.passes.shadows import ShadowAtlas
 from defshade_cli.passes.tables import NO_TABLES, LightTables
 from defshade_cli.passes.volumes import cone_volume, sphere_volume
 from defshade_cli.plan import Plan, PlannedLight, Volume
-from defshade_cli.scene.emission import Emitter
-from defshade_cli.scene.ies import IesProfile
-from defshade_cli.scene.light import Light, Profile, Shaping
-from defshade_cli.scene.shadow import ShadowStyle
 from defshade_cli.settings import Layout, Shading
-
-_PROFILES: tuple[Profile, ...] = ("uniform", "cosine", "sine")
-_NO_CONE = 2.0 * math.pi
-_NO_IES = 0xFFFFFFFF
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,54 +153,3 @@ def volume_array(gpu: Gpu, volume: Volume, program: moderngl.Program) -> moderng
     vertices = gpu.keep(gpu.context.buffer(corners.tobytes()))
     indices = gpu.keep(gpu.context.buffer(triangles.tobytes()))
     return gpu.keep(gpu.context.vertex_array(program, [(vertices, "3f", "corner")], indices))
-
-
-def light_records(
-    lights: Sequence[PlannedLight],
-    emitters: Sequence[Emitter],
-    eye: NDArray[np.float64],
-    shadows: ShadowAtlas | None,
-    tables: LightTables = NO_TABLES,
-) -> NDArray:
-    """One Light record each, positions relative to the eye."""
-    records = np.zeros(len(lights), record("Light"))
-    for row, planned, emitter in zip(records, lights, emitters, strict=True):
-        row["position"], row["axis"], row["facing"] = emitter.position - eye, emitter.axis, emitter.facing
-        row["profile"] = _PROFILES.index(emitter.profile)
-        with np.errstate(over="ignore"):  # an infinity in the image is found after the frame, with its light
-            row["intensity"] = emitter.intensity
-        row["response"] = (planned.light.diffuse, planned.light.specular)
-        aside = float(np.linalg.norm(emitter.position - planned.light.position))
-        row["reach"], row["extent"] = planned.reach + aside, emitter.extent
-        row["is_sky"] = planned.light.kind == "dome"
-        _set_shaping(row, planned.light.shaping)
-        _set_profile(row, planned.light, tables.profiles)
-        _set_shadow(row, planned.light.shadow)
-        row["first_link"] = tables.links.lights.get(planned.light, ALL_LINKED)
-    if shadows:
-        records["first_shadow"], records["shadow_count"] = shadows.first, shadows.count
-    return records
-
-
-def _set_shaping(row: np.void, shaping: Shaping | None) -> None:
-    if shaping is None:
-        row["cone_angle"] = row["cone_smooth_start"] = _NO_CONE
-        return
-    angle, softness = math.radians(shaping.cone_angle), min(max(shaping.cone_softness, 0.0), 1.0)
-    row["cone_angle"], row["cone_smooth_start"] = angle, angle * (1.0 - softness)
-    row["focus"], row["focus_tint"] = shaping.focus, shaping.focus_tint
-
-
-def _set_shadow(row: np.void, shadow: ShadowStyle) -> None:
-    row["shadow_color"], row["shadow_distance"] = shadow.color, shadow.distance
-    row["shadow_fading"], row["shadow_gamma"] = shadow.fading, shadow.gamma
-
-
-def _set_profile(row: np.void, light: Light, profiles: Sequence[IesProfile]) -> None:
-    shaping = light.shaping
-    if shaping is None or shaping.ies is None:
-        row["ies_table"] = _NO_IES
-        return
-    row["right"], row["up"] = light.frame[:, 0], light.frame[:, 1]
-    row["ies_table"], row["ies_scale"] = profiles.index(shaping.ies), shaping.ies_scale
-    row["ies_vertical"] = shaping.ies_vertical

@@ -20,9 +20,10 @@ from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
 from defshade_cli.passes.identification import Manifests, Mattes, id_manifests
+from defshade_cli.passes.light_records import light_records
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.light_tiles import LightTiles
-from defshade_cli.passes.lighting import LightingPass, LightingVariant, light_records
+from defshade_cli.passes.lighting import LightingPass, LightingVariant
 from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.motion import motion_records, neighbouring_points
 from defshade_cli.passes.readback import Planes, data_layers, read_planes

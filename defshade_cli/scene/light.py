@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -108,7 +109,7 @@ class Light(ABC):
         """(3,) world space."""
         return self.world_from_light[:3, 3]
 
-    @property
+    @cached_property
     def axis(self) -> NDArray[np.float64]:
         """(3,) unit: the direction of emission, −Z of the light."""
         return normalize(-self.world_from_light[:3, 2])
@@ -127,7 +128,7 @@ class Light(ABC):
         """How far points of the light lie from `position`, in the world; the sine of half a distant light's angle."""
         return 0.0
 
-    @property
+    @cached_property
     def emission(self) -> NDArray[np.float64]:
         """(3,) color · intensity · 2^exposure, before normalisation by size; nits."""
         return self.color * (self.intensity * math.exp2(self.exposure))
@@ -213,14 +214,19 @@ class SphereLight(Light):
     @property
     def world_radius(self) -> float:
         """The greatest, where the transform makes an ellipsoid of the sphere."""
-        return self.radius * float(np.linalg.norm(self.world_from_light[:3, :3], ord=2))
+        return self.radius * float(self._stretches[0])
 
-    @property
+    @cached_property
+    def _stretches(self) -> NDArray[np.float64]:
+        """(3,) of the transform along the ellipsoid's axes, the greatest first."""
+        return np.asarray(np.linalg.svd(self.world_from_light[:3, :3], compute_uv=False), np.float64)
+
+    @cached_property
     def size_factor(self) -> float:
         """Area of the ellipsoid that the transform makes: 4π R_G(a²b², a²c², b²c²) (DLMF 19.33.1)."""
-        a, b, c = (self.radius * np.linalg.svd(self.world_from_light[:3, :3], compute_uv=False)) ** 2
-        if np.isclose(a, c, rtol=1e-12):
-            return 4.0 * math.pi * float(a)
+        a, b, c = ((self.radius * self._stretches) ** 2).tolist()
+        if math.isclose(a, c, rel_tol=1e-12):
+            return 4.0 * math.pi * a
         from scipy.special import elliprg  # a quarter of a second to import, and few lights are ellipsoids
 
         return 4.0 * math.pi * float(elliprg(a * b, a * c, b * c))
