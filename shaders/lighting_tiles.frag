@@ -4,19 +4,21 @@
 
 layout(std430, binding = 9) readonly buffer LightListBlock { uint light_lists[]; };
 
-flat in uvec2 tile_run;
+uniform usampler2D tile_runs;      // of each tile, the first entry in the lists and how many
 
-// Every light of a tile: what the GBuffer says of a pixel is read once.
+// Every light of a pixel's tile: what the GBuffer says of it is read once.
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     float stored = texelFetch(plane_depth, pixel, 0).x;
     if (stored == BACKGROUND_DEPTH) discard;
+    uvec2 run = texelFetch(tile_runs, pixel / LIGHT_TILE, 0).xy;
+    if (run.y == 0u) discard;
     vec3 position = position_at(gl_FragCoord.xy, camera_depth(stored));
     Surface surface = read_planes(pixel);
     vec3 v = direction_to_eye(position);
     float widening = pixel_alpha_squared(surface, pixel);
-    Lit total = Lit(vec3(0.0), vec3(0.0), 0.0, 0.0, float(tile_run.y));
-    for (uint i = tile_run.x; i < tile_run.x + tile_run.y; ++i) {
+    Lit total = Lit(vec3(0.0), vec3(0.0), 0.0, 0.0, float(run.y));
+    for (uint i = run.x; i < run.x + run.y; ++i) {
         Light light = light_at(light_lists[i]);
         vec3 l;
         vec3 irradiance = irradiance_from(light, position, l);

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from build import bulb, quad, scene, sun
 from defshade_cli import render
 from defshade_cli.passes.light_lists import TILE, LightBounds, list_lights, tile_boxes
+from defshade_cli.passes.screen import regions_of
 from defshade_cli.plan import make_plan
 from defshade_cli.plan.cost import covered_share
 from defshade_cli.settings import RenderSettings
@@ -96,9 +97,11 @@ def test_a_tile_lists_every_light_that_reaches_a_pixel_of_it(chosen: list, seed:
         tile_boxes(_ranges(depth), WINDOW, SIZE, perspective=perspective),
     )
     listed = np.zeros((len(chosen), 4, 5), bool)
-    for tile, (first, count) in zip(lists.tiles, lists.runs, strict=True):
-        assert (np.diff(lists.lights[first : first + count].astype(int)) > 0).all()
-        listed[lists.lights[first : first + count], tile // 5, tile % 5] = True
+    for row, column in np.ndindex(4, 5):
+        first, count = lists.runs[row, column]
+        run = lists.lights[first : first + count].astype(int)
+        assert (np.diff(run) > 0).all()
+        listed[run, row, column] = True
     lit = _lit(centre, reach, axis, angle, _points(depth, perspective))
     rows, columns = np.arange(SIZE[1]) // TILE, np.arange(SIZE[0]) // TILE
     assert not (lit & ~listed[:, rows][:, :, columns]).any()
@@ -145,3 +148,13 @@ def test_one_light_is_a_volume_and_many_are_tiles() -> None:
     assert make_plan(of, RenderSettings(size=SIZE)).lighting == "tiles"
     assert make_plan(of, RenderSettings(size=SIZE, layers=("lightComplexity",))).lighting == "volumes"
     assert make_plan(of, RenderSettings(size=SIZE, lighting="volumes")).lighting == "volumes"
+
+
+@given(st.integers(1, 7), st.integers(1, 9), st.integers(0, 2**32 - 1))
+def test_regions_cover_the_tiles_and_no_others(rows: int, columns: int, seed: int) -> None:
+    tiles = np.random.default_rng(seed).random((rows, columns)) < 0.6
+    size = (columns * TILE - 5, rows * TILE - 9)
+    covered = np.zeros((rows, columns), int)
+    for left, top, right, bottom in regions_of(tiles, TILE, size) * np.array(size * 2) / TILE:
+        covered[round(top) : math.ceil(bottom - 1e-3), round(left) : math.ceil(right - 1e-3)] += 1
+    np.testing.assert_array_equal(covered, tiles)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.passes.frame import Size
+from defshade_cli.passes.screen import regions_of
 
 TILE = 32
 """Pixels a side."""
@@ -60,12 +61,8 @@ class Convergence:
             self.active = active & (self.error > self._max_error)
 
     def regions(self, tiles: NDArray[np.bool_]) -> NDArray[np.float32]:
-        """(R, 4) rectangles of some tiles, a run of neighbours in a row each: left, top, right, bottom as shares."""
-        steps = np.diff(np.pad(tiles, ((0, 0), (1, 1))).astype(np.int8), axis=1)
-        (rows, first), (_, end) = np.nonzero(steps == 1), np.nonzero(steps == -1)
-        corners = np.stack([first, rows, end, rows + 1], axis=1) * TILE
-        width, height = self._size
-        return np.minimum(corners / np.array([width, height] * 2), 1.0).astype(np.float32)
+        """(R, 4) rectangles of some tiles: left, top, right, bottom as shares."""
+        return regions_of(tiles, TILE, self._size)
 
     def sample_count(self) -> NDArray[np.int32]:
         """(height, width, 1) samples that each pixel got."""

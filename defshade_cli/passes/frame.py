@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import moderngl
+
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import Plane
 from defshade_cli.gpu.targets import Target, allocate
@@ -23,6 +25,7 @@ class Frame:
         self._radiance: dict[tuple[str, GBuffer | None], Target] = {}
         self._lights: tuple[tuple, LightTargets | None] = (), None
         self._ranges: Target | None = None
+        self._runs: moderngl.Texture | None = None
 
     def gbuffer(self, size: Size, planes: tuple[Plane, ...], layout: Layout) -> GBuffer:
         """The GBuffer of (width, height) in a layout, as last drawn. Raises GpuError."""
@@ -47,6 +50,15 @@ class Frame:
                 self._ranges.release()
             self._ranges = allocate(self._gpu, tiles, {"range": (2, "f4")})
         return self._ranges
+
+    def tile_runs(self, tiles: Size) -> moderngl.Texture:
+        """A texture of two integers for each of (columns, rows) tiles."""
+        if self._runs is None or self._runs.size != tiles:
+            if self._runs:
+                self._runs.release()
+            self._runs = self._gpu.context.texture(tiles, 2, dtype="u4")
+            self._runs.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        return self._runs
 
     def light_targets(self, radiance: Target, plan: Plan) -> LightTargets:
         """For the plan's lights, behind the radiance of a sample; those of another kind of plan are freed."""

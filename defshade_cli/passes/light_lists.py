@@ -56,18 +56,17 @@ class LightBounds:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LightLists:
-    """tiles: (T,) those that some light reaches, row by row.  runs: (T, 2) first entry and number of each in `lights`.
+    """runs: (rows, columns, 2) each tile's first entry in `lights`, and how many it has.
 
-    lights: uint32 numbers, ascending within a run.
+    lights: numbers, ascending within a run.
     """
 
-    tiles: NDArray[np.int64]
     runs: NDArray[np.uint32]
     lights: NDArray[np.uint32]
 
 
 def list_lights(bounds: LightBounds, boxes: NDArray[np.float64]) -> LightLists:
-    """Of (rows, columns, 2, 3) boxes; the tiles are numbered row by row."""
+    """Of (rows, columns, 2, 3) boxes."""
     blocks, members = _blocks(boxes)
     light, block = (each.ravel() for each in np.indices((len(bounds), len(blocks))))
     near = bounds.meet(light, blocks[block])
@@ -75,10 +74,10 @@ def list_lights(bounds: LightBounds, boxes: NDArray[np.float64]) -> LightLists:
     tile, light = members[block].ravel(), light.repeat(members.shape[1])
     light, tile = light[tile >= 0], tile[tile >= 0]
     near = bounds.meet(light, boxes.reshape(-1, 2, 3)[tile])
-    entries = np.sort(tile[near] * len(bounds) + light[near])
-    tiles, first, counts = np.unique(entries // max(len(bounds), 1), return_index=True, return_counts=True)
-    runs = np.column_stack([first, counts]).astype(np.uint32)
-    return LightLists(tiles, runs, (entries % max(len(bounds), 1)).astype(np.uint32))
+    tile, light = np.divmod(np.sort(tile[near] * len(bounds) + light[near]), max(len(bounds), 1))
+    counts = np.bincount(tile, minlength=boxes[..., 0, 0].size)
+    runs = np.stack([np.cumsum(counts) - counts, counts], axis=-1)
+    return LightLists(runs.reshape(*boxes.shape[:2], 2).astype(np.uint32), light.astype(np.uint32))
 
 
 def _blocks(boxes: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

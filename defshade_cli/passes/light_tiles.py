@@ -21,10 +21,10 @@ from defshade_cli.gpu.records import block_source, record
 from defshade_cli.gpu.residence import LIGHT_BLOCK, LIGHT_LISTS, RecordBuffer
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer
-from defshade_cli.passes.light_lists import TILE, LightBounds, LightLists, list_lights, tile_boxes
+from defshade_cli.passes.light_lists import TILE, LightBounds, list_lights, tile_boxes
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.lighting import LightingVariant
-from defshade_cli.passes.screen import Screen
+from defshade_cli.passes.screen import Screen, regions_of
 from defshade_cli.passes.shadows import ShadowAtlas
 from defshade_cli.passes.tables import NO_TABLES, LightTables
 from defshade_cli.plan import Plan, PlannedLight
@@ -43,13 +43,15 @@ class LightTiles:
         self._block = RecordBuffer(gpu, LIGHT_BLOCK, uniform=True)
         self._lists = RecordBuffer(gpu, LIGHT_LISTS)
         self._depth_ranges = cache(lambda *kind: DepthRangesPass(gpu, *kind))
-        self._program = cache(lambda variant: _compile(gpu, variant, self._most))
+        self._screen = Screen(gpu)
+        self._array = cache(lambda variant: self._screen.array(_compile(gpu, variant, self._most)))
 
     def begin(self, gbuffer: GBuffer, view: NDArray, plan: Plan) -> None:
         """What the tiles show, by the GBuffer and the View record that it was drawn with."""
         self._plan, perspective = plan, plan.camera.projection == "perspective"
         ranges = self._depth_ranges(gbuffer.layout, perspective)
         depths = ranges.read(gbuffer, self._frame, plan.size)
+        self._runs = self._frame.tile_runs(depths.shape[1::-1])
         window = view["window"][0].astype(np.float64)
         self._boxes = tile_boxes(depths, window, plan.size, perspective=perspective)
         self._camera_from_relative = np.linalg.inv(view["relative_from_camera"][0].T.astype(np.float64))
@@ -66,34 +68,27 @@ class LightTiles:
         """All `lights` on top of what the targets hold. Shaped ones are apart: their shader costs twice as much."""
         self._context.enable_only(moderngl.BLEND)
         self._context.blend_func = moderngl.ONE, moderngl.ONE
+        maps = shadows.depth if shadows else None
         kinds = [(planned.groups, planned.light.shaping is not None) for planned in lights]
         for kind in dict.fromkeys(kinds):
             members = np.array([number for number, other in enumerate(kinds) if other == kind])
-            program = self._program(LightingVariant.of(self._plan, [lights[number] for number in members]))
+            array = self._array(LightingVariant.of(self._plan, [lights[number] for number in members]))
             targets.of(kind[0]).use()
-            gbuffer.bind(program, shadow_atlas=shadows.depth if shadows else None, ies_tables=tables.candela)
+            gbuffer.bind(array.program, tile_runs=self._runs, shadow_atlas=maps, ies_tables=tables.candela)
             for first in range(0, len(members), self._most):
-                self._draw(program, records[members[first : first + self._most]])
+                self._draw(array, records[members[first : first + self._most]])
 
-    def _draw(self, program: moderngl.Program, records: NDArray) -> None:
+    def _draw(self, array: moderngl.VertexArray, records: NDArray) -> None:
         lists = list_lights(light_bounds(records, self._camera_from_relative), self._boxes)
-        if not len(lists.tiles):
+        if not len(lists.lights):
             return
         block = np.zeros(self._most, records.dtype)
         block[: len(records)] = records
         self._block.write(block)
         self._lists.write(lists.lights)
-        regions, runs = (self._context.buffer(data.tobytes()) for data in (self._regions(lists), lists.runs))
-        array = self._context.vertex_array(program, [(regions, "4f/i", "region"), (runs, "2u/i", "run")])
-        array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(lists.tiles))
-        for each in (array, regions, runs):
-            each.release()
-
-    def _regions(self, lists: LightLists) -> NDArray[np.float32]:
-        """(T, 4) left, top, right, bottom of the tiles as shares of the image."""
-        row, column = np.divmod(lists.tiles, self._boxes.shape[1])
-        corners = np.column_stack([column, row, column + 1, row + 1]) * float(TILE)
-        return np.minimum(corners / np.array(self._plan.size * 2), 1.0).astype(np.float32)
+        self._runs.write(lists.runs)
+        self._screen.cover(regions_of(lists.runs[..., 1] > 0, TILE, self._plan.size))
+        self._screen.draw(array)
 
 
 class DepthRangesPass:
@@ -124,8 +119,8 @@ def _compile(gpu: Gpu, variant: LightingVariant, most: int) -> moderngl.Program:
     }
     far = "quad" in variant.volumes
     distances = ["VOLUME_QUAD" if variant.volumes == ("quad",) else "VOLUMES_MIXED"] * far
-    files = ("light_tiles.vert", "lighting_tiles.frag")
-    return gpu.shaders.program(*files, defines=[*variant.defines, *distances], generated=generated)
+    defines = [*variant.defines, *distances, f"LIGHT_TILE {TILE}"]
+    return gpu.shaders.program("screen.vert", "lighting_tiles.frag", defines=defines, generated=generated)
 
 
 def light_bounds(records: NDArray, camera_from_relative: NDArray[np.float64]) -> LightBounds:

@@ -13,6 +13,22 @@ WHOLE = np.array([[0.0, 0.0, 1.0, 1.0]], np.float32)
 """The one region that is all of the image: left, top, right, bottom as shares of it."""
 
 
+def regions_of(tiles: NDArray[np.bool_], side: int, size: tuple[int, int]) -> NDArray[np.float32]:
+    """(R, 4) rectangles that cover some of the tiles of `side` pixels of an image of (width, height), and no others.
+
+    tiles: (rows, columns). Left, top, right, bottom as shares of the image: runs in a row, joined over equal rows.
+    """
+    steps = np.diff(np.pad(tiles, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    (row, first), (_, end) = np.nonzero(steps == 1), np.nonzero(steps == -1)
+    order = np.lexsort((row, end, first))
+    row, first, end = row[order], first[order], end[order]
+    starts = np.ones(len(row), bool)
+    starts[1:] = (np.diff(first) != 0) | (np.diff(end) != 0) | (np.diff(row) != 1)
+    last = np.append(np.flatnonzero(starts)[1:], len(row)) - 1
+    corners = np.column_stack([first[starts], row[starts], end[starts], row[last[: starts.sum()]] + 1]) * side
+    return np.minimum(corners / np.array(size * 2), 1.0).astype(np.float32)
+
+
 class Screen:
     """Rectangles that shaders/screen.vert draws as instances of one quad."""
 
