@@ -11,7 +11,7 @@ from pxr import Usd, UsdGeom
 import stages
 from defshade_cli.usd.cages import SEGMENTS, capsule_cage, cone_cage, frustum_cage, sphere_cage
 from defshade_cli.usd.control import smooth_control
-from defshade_cli.usd.extent import extent_of, stage_extent
+from defshade_cli.usd.extent import extents_of, stage_extent
 from defshade_cli.usd.geometry import read_surface
 from defshade_cli.usd.polygons import Polygons
 from defshade_cli.usd.reader import StageReader
@@ -81,11 +81,11 @@ def test_an_extent_is_the_authored_one_then_usds() -> None:
     ball.CreateRadiusAttr(2.0)
     surface = read_surface(ball.GetPrim(), DEFAULT, as_cages=True)
     assert surface is not None
-    np.testing.assert_array_equal(extent_of(stage, surface, DEFAULT), [[-2] * 3, [2] * 3])
+    np.testing.assert_array_equal(extents_of(stage, [surface], DEFAULT)[0], [[-2] * 3, [2] * 3])
     ball.CreateExtentAttr([(-3, -3, -3), (3, 3, 3)])
-    np.testing.assert_array_equal(extent_of(stage, surface, DEFAULT), [[-3] * 3, [3] * 3])
+    np.testing.assert_array_equal(extents_of(stage, [surface], DEFAULT)[0], [[-3] * 3, [3] * 3])
     ball.GetExtentAttr().Set([(1, 1, 1), (-1, -1, -1)])
-    np.testing.assert_array_equal(extent_of(stage, surface, DEFAULT), surface.polygons.bounds)
+    np.testing.assert_array_equal(extents_of(stage, [surface], DEFAULT)[0], surface.polygons.bounds)
 
 
 def test_what_cannot_be_drawn_takes_the_room_that_it_says() -> None:

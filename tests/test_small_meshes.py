@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from defshade_cli.usd.cut import cut
 from defshade_cli.usd.normals import with_normals
 from defshade_cli.usd.polygons import Polygons, Scheme
 from defshade_cli.usd.small_meshes import shape_all
+from defshade_cli.usd.subsets import Faces
 from defshade_cli.usd.triangulation import triangulate
 
 
@@ -29,13 +31,17 @@ def test_together_is_as_alone_to_the_bit(scheme: Scheme, left_handed: bool) -> N
     shaped = shape_all(meshes)
     assert len(shaped) == len(meshes)
     for each in meshes:
-        normals, (triangles, face) = shaped[each]
+        normals, (triangles, face), corners = shaped[each]
         alone = with_normals(each).normals
         assert alone is not None and normals.interpolation == alone.interpolation
         assert normals.values.tobytes() == alone.values.tobytes()
         expected, expected_face = triangulate(each, [])
         np.testing.assert_array_equal(triangles, expected)
         np.testing.assert_array_equal(face, expected_face)
+        together, apart = (cut(with_normals(each), Faces(("/m",)), "/m", known).mesh for known in (shaped[each], None))
+        assert corners is not None
+        for name in ("points", "normals", "triangles", "faces"):
+            assert getattr(together, name).tobytes() == getattr(apart, name).tobytes()
 
 
 def test_what_is_not_small_is_left_out() -> None:

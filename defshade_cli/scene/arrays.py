@@ -17,6 +17,8 @@ def frozen(values: Any, dtype: DTypeLike, *shape: int) -> NDArray:
     found = array.shape
     if shape != found and (len(shape) != len(found) or not all(map(_fits, shape, found))):
         raise ValueError(f"expected shape {shape}, got {found}")
+    if not array.flags.writeable:
+        return array
     array = array.view()
     array.flags.writeable = False
     return array

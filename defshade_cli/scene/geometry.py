@@ -53,10 +53,9 @@ class Mesh:
             freeze(self, "display_color", frozen(self.display_color, np.float32, count, 3))
         if self.display_opacity is not None:
             freeze(self, "display_opacity", frozen(self.display_opacity, np.float32, count))
-        freeze(
-            self, "primvars", {name: frozen(values, np.float32, count, -1) for name, values in self.primvars.items()}
-        )
-        freeze(self, "uvs", {name: frozen(uv, np.float32, count, 2) for name, uv in self.uvs.items()})
+        for name, width in (("primvars", -1), ("uvs", 2)):
+            if named := getattr(self, name):
+                freeze(self, name, {key: frozen(values, np.float32, count, width) for key, values in named.items()})
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
@@ -134,7 +133,7 @@ class Drawable:
         freeze = object.__setattr__
         freeze(self, "world_from_object", frozen(self.world_from_object, np.float64, count, 4, 4))
         freeze(self, "instance_ids", frozen(self.instance_ids, np.int32, count))
-        sets = np.zeros(count) if self.link_sets is None else self.link_sets
+        sets = np.zeros(count, np.uint32) if self.link_sets is None else self.link_sets
         freeze(self, "link_sets", frozen(sets, np.uint32, count))
         freeze(self, "display_color", frozen(self.display_color, np.float32, count, 3))
         freeze(self, "display_opacity", frozen(self.display_opacity, np.float32, count))

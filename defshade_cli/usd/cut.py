@@ -9,8 +9,9 @@ import numpy as np
 
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.usd.polygons import Polygons, Primvar
+from defshade_cli.usd.small_meshes import Shaped
 from defshade_cli.usd.subsets import FaceGroup, Faces
-from defshade_cli.usd.triangulation import Triangles, triangulate
+from defshade_cli.usd.triangulation import triangulate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,14 +52,20 @@ class Cut:
         return same and next(named) == next(named)
 
 
-def cut(polygons: Polygons, faces: Faces, path: str, triangles: Triangles | None = None) -> Cut:
+def cut(
+    polygons: Polygons, faces: Faces, path: str, shaped: Shaped | None = None, *, double_sided: bool = False
+) -> Cut:
     """Triangles over the points, or over the corners where something on the mesh splits points.
 
-    triangles: of polygons without holes, where they are known.
+    polygons: with normals, unless `shaped` has them.  shaped: what is known of them; they have no holes then.
     """
+    if shaped and shaped.corners:
+        known = shaped.corners
+        mesh = Mesh(path, known.points, known.normals, known.triangles, known.faces, double_sided=double_sided)
+        return Cut(polygons, faces, known.split, *faces.sort(mesh), ())
     issues: list[str] = []
     whole = polygons.without_holes().joined()
-    corners, face = triangles or triangulate(whole, issues)
+    corners, face = shaped.triangles if shaped else triangulate(whole, issues)
     if whole.left_handed:
         corners = corners[:, ::-1]
     split = any(primvar.splits_points for primvar in whole.primvars)
@@ -75,6 +82,7 @@ def cut(polygons: Polygons, faces: Faces, path: str, triangles: Triangles | None
         display_opacity=place(opacity) if varies(opacity) else None,
         uvs={name: place(uv) for name, uv in whole.uvs.items()},
         primvars={name: place(primvar) for name, primvar in whole.shown.items()},
+        double_sided=double_sided,
     )
     return Cut(polygons, faces, split, *faces.sort(mesh), tuple(issues))
 

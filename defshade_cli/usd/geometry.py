@@ -162,12 +162,12 @@ def tessellate(
     last: an earlier one, of which is kept what fits.  shaped: what is known of polygons that are not refined.
     """
     if shaped:
-        refined = replace(surface.polygons, normals=shaped.normals)
+        refined = surface.polygons if shaped.corners else replace(surface.polygons, normals=shaped.normals)
     else:
         refined = with_normals(refiner.refine(surface.polygons) if refiner else surface.polygons)
     polygons = shared(refined, last.cut.polygons) if last else refined
     known = last.cut.moved(polygons, surface.faces) if last else None
-    made = known or cut(polygons, surface.faces, surface.path, shaped and shaped.triangles)
+    made = known or cut(polygons, surface.faces, surface.path, shaped, double_sided=surface.double_sided)
     level = (refiner.level if refiner else 0) if surface.control else None
     mesh = made.mesh
     if (mesh.double_sided, mesh.level) != (surface.double_sided, level):
@@ -238,7 +238,7 @@ def _read_shape(
     if solid is not None:
         return _Shape(solid)
     if prim.IsA(UsdGeom.Mesh):
-        return _Shape(read_mesh(UsdGeom.Mesh(prim), said, time, issues, color))
+        return _Shape(read_mesh(prim, said, time, issues, color))
     if prim.IsA(UsdGeom.Points):
         return _Shape(*read_points(UsdGeom.Points(prim), time, issues, color, as_disks=as_cages))
     if prim.IsA(UsdGeom.BasisCurves):

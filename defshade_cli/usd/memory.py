@@ -72,11 +72,11 @@ class Memory:
 
     def _read_surface(self, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Surface | None:
         subsets = material_subsets(prim)
-        self._bound(str(prim.GetPath()), said.names)
+        bound = self._bound(str(prim.GetPath()), said.names)
         surface = read_surface(
             prim,
             time,
-            self._color_primvar(prim, subsets, time),
+            self._color_primvar(prim, subsets, time) if subsets or any(bound.bindings) else DISPLAY_COLOR,
             self._extras.primvars,
             self._shapes,
             as_cages=self._as_cages,

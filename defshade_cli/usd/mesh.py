@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.usd.normals import mend_normals
 from defshade_cli.usd.polygons import SCHEMES, Polygons, Primvar, Scheme
-from defshade_cli.usd.positions import read_positions
+from defshade_cli.usd.positions import read_positions, still_positions
 from defshade_cli.usd.primvars import (
     DISPLAY_COLOR,
     Authored,
@@ -19,7 +21,7 @@ from defshade_cli.usd.primvars import (
     read_carried,
 )
 from defshade_cli.usd.said import Said
-from defshade_cli.usd.values import integers
+from defshade_cli.usd.values import are_finite, integers
 
 MESH_ATTRIBUTES = ("points", "faceVertexCounts", "faceVertexIndices", "holeIndices", "normals")
 """What is read of a Mesh that may vary over time, besides primvars."""
@@ -29,52 +31,74 @@ _NONE = np.empty(0, np.int32)
 
 
 def read_mesh(
-    mesh: UsdGeom.Mesh, said: Said, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR
+    prim: Usd.Prim, said: Said, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR
 ) -> Polygons:
-    """The mesh as authored, before refinement: faces that cannot be drawn are left out, holes stay."""
+    """The mesh as authored, before refinement: faces that cannot be drawn are left out, holes stay.
+
+    Attributes are asked by name: a schema's accessors take half as long again.
+    """
     names = said.names
-    points = _points(mesh, time, issues)
-    counts, indices = _topology(mesh, time, issues) if len(points) else (_NONE, _NONE)
+    points = _points(prim, said, time, issues)
+    counts, indices = _topology(prim, time, issues) if len(points) else (_NONE, _NONE)
+    is_whole = _is_whole(points, counts, indices)
+    if not is_whole:
+        counts, indices = _complete(counts, indices, issues)
+    scheme = _scheme(prim, issues) if "subdivisionScheme" in names else "catmullClark"
     elements = count_elements(len(counts), len(points), len(indices))
-    scheme = _scheme(mesh, issues) if "subdivisionScheme" in names else "catmullClark"
     has_normals = scheme == "none" and ("normals" in names or "primvars:normals" in names)
     polygons = Polygons(
         points=points,
         counts=counts,
         indices=indices,
         faces=np.arange(len(counts), dtype=np.int32),
-        holes=_holes(mesh, time, len(counts), issues) if "holeIndices" in names else _NONE,
+        holes=_holes(prim, time, len(counts), issues) if "holeIndices" in names else _NONE,
         scheme=scheme,
-        left_handed="orientation" in names and mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded,
-        normals=_normals(mesh, time, elements, issues) if has_normals else None,
+        left_handed="orientation" in names and prim.GetAttribute("orientation").Get() == UsdGeom.Tokens.leftHanded,
+        normals=_normals(UsdGeom.Mesh(prim), time, elements, issues) if has_normals else None,
     )
     if said.primvars:
-        polygons = read_carried(mesh.GetPrim(), time, elements, issues, color).laid_on(polygons)
-    return mend_normals(_without_broken_faces(polygons, issues), issues)
+        polygons = read_carried(prim, time, elements, issues, color).laid_on(polygons)
+    return mend_normals(polygons if is_whole else _without_broken_faces(polygons, issues), issues)
 
 
-def _points(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> NDArray[np.float32]:
-    points = read_positions(mesh.GetPrim(), time)
+def _points(prim: Usd.Prim, said: Said, time: Usd.TimeCode, issues: list[str]) -> NDArray[np.float32]:
+    points = read_positions(prim, time) if "velocities" in said.names else still_positions(prim, time)
     if points is None or not len(points):
-        type_name = mesh.GetPointsAttr().GetTypeName()
+        type_name = prim.GetAttribute("points").GetTypeName()
         issues.append("it has no points" if type_name.type == _POINTS else f"its points are {type_name}, not point3f[]")
         return np.empty((0, 3), np.float32)
     return points
 
 
-def _topology(
-    mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]
-) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
-    """Corners a face, not negative, and their indices, as many; faces whose corners are missing are cut off.
-
-    The counts are not believed before they are compared: no memory is taken for what they claim.
-    """
-    counts = integers(mesh.GetFaceVertexCountsAttr().Get(time))
-    indices = integers(mesh.GetFaceVertexIndicesAttr().Get(time))
+def _topology(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
+    """Corners a face, and their indices, as they are authored."""
+    counts = integers(prim.GetAttribute("faceVertexCounts").Get(time))
+    indices = integers(prim.GetAttribute("faceVertexIndices").Get(time))
     if counts is None or indices is None or not len(counts) or not len(indices):
         issues.append("it has no faces")
         return _NONE, _NONE
-    if counts.min() >= 0 and counts.sum(dtype=np.int64) == len(indices):
+    return counts, indices
+
+
+def _is_whole(points: NDArray, counts: NDArray, indices: NDArray) -> bool:
+    """Is everything there and drawn: three corners a face and more, at points that exist and are finite?
+
+    Reductions of ufuncs, and one for both ends of a range: arrays are small, and each question counts.
+    """
+    if not len(counts) or np.minimum.reduce(counts) < 3 or np.add.reduce(counts, dtype=np.int64) != len(indices):
+        return False
+    unsigned = indices.view(f"u{indices.itemsize}")  # what is negative is large
+    return bool(np.maximum.reduce(unsigned) < len(points)) and are_finite(points)
+
+
+def _complete(
+    counts: NDArray[np.integer], indices: NDArray[np.integer], issues: list[str]
+) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
+    """Counts that are not negative, and as many indices; faces whose corners are missing are cut off.
+
+    The counts are not believed before they are compared: no memory is taken for what they claim.
+    """
+    if not len(counts):
         return counts, indices
     counts = np.maximum(counts, 0)
     ends = np.cumsum(counts, dtype=np.int64)
@@ -86,17 +110,16 @@ def _topology(
     return counts[:complete], indices[: ends[complete - 1] if complete else 0]
 
 
-def _scheme(mesh: UsdGeom.Mesh, issues: list[str]) -> Scheme:
-    authored_scheme = mesh.GetSubdivisionSchemeAttr().Get()
-    for scheme in SCHEMES:
-        if scheme == authored_scheme:
-            return scheme
+def _scheme(prim: Usd.Prim, issues: list[str]) -> Scheme:
+    authored_scheme = prim.GetAttribute("subdivisionScheme").Get()
+    if authored_scheme in SCHEMES:
+        return cast(Scheme, authored_scheme)
     issues.append(f"subdivisionScheme {authored_scheme!r} is unknown; the mesh is drawn as polygons")
     return "none"
 
 
-def _holes(mesh: UsdGeom.Mesh, time: Usd.TimeCode, faces: int, issues: list[str]) -> NDArray[np.integer]:
-    holes = integers(mesh.GetHoleIndicesAttr().Get(time))
+def _holes(prim: Usd.Prim, time: Usd.TimeCode, faces: int, issues: list[str]) -> NDArray[np.integer]:
+    holes = integers(prim.GetAttribute("holeIndices").Get(time))
     if holes is None:
         return _NONE
     valid = (holes >= 0) & (holes < faces)
@@ -119,17 +142,8 @@ def _normals(mesh: UsdGeom.Mesh, time: Usd.TimeCode, elements: Elements, issues:
     return None
 
 
-def _is_whole(polygons: Polygons) -> bool:
-    points, counts, indices = polygons.points, polygons.counts, polygons.indices
-    if not len(counts) or counts.min() < 3:
-        return False
-    return bool(indices.min() >= 0 and indices.max() < len(points) and np.isfinite(points).all())
-
-
 def _without_broken_faces(polygons: Polygons, issues: list[str]) -> Polygons:
     """The faces of three corners and more, all of them at points that exist and are finite."""
-    if _is_whole(polygons):
-        return polygons
     missing = (polygons.indices < 0) | (polygons.indices >= len(polygons.points))
     adrift = np.zeros_like(missing)
     lost = np.logical_not(np.isfinite(polygons.points).all(axis=1))

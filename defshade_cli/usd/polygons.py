@@ -6,7 +6,7 @@ takes and gives it. A corner is one face-vertex.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import blake2b
@@ -21,6 +21,7 @@ Scheme = Literal["none", "bilinear", "catmullClark", "loop"]
 SCHEMES: tuple[Scheme, ...] = ("none", "bilinear", "catmullClark", "loop")
 
 _CORNERS_AT_ONCE = 1 << 20
+_FEW_CORNERS = 256
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,18 +161,22 @@ class Polygons:
         return replace(self, display_color=color, display_opacity=opacity)
 
     @cached_property
-    def digest(self) -> bytes:
-        """Equal for polygons that are equal in everything."""
-        named = (self.normals, self.display_color, self.display_opacity, *self.uvs.values(), *self.shown.values())
-        kinds = [primvar and primvar.interpolation for primvar in named]
-        values = (primvar.values for primvar in named if primvar)
-        arrays = (self.points, self.counts, self.indices, self.faces, self.holes, *values)
-        layout = [(array.dtype.str, array.shape) for array in arrays]
-        said = repr((self.scheme, self.left_handed, tuple(self.uvs), tuple(self.shown), kinds, layout))
-        found = blake2b(said.encode(), digest_size=16)
+    def digest(self) -> Hashable:
+        """Equal for polygons that are equal in everything: of few corners their bytes, else a hash of these."""
+        arrays = [self.points, self.counts, self.indices, self.faces, self.holes]
+        said: list[Hashable] = [self.scheme, self.left_handed, *self.uvs, 0, *self.shown]
+        if self.primvars:
+            named = (self.normals, self.display_color, self.display_opacity, *self.uvs.values(), *self.shown.values())
+            said += [primvar and primvar.interpolation for primvar in named]
+            arrays += [primvar.values for primvar in named if primvar]
+        said += [array.dtype.char for array in arrays]
+        said += [array.shape for array in arrays]
+        if len(self.indices) <= _FEW_CORNERS:
+            return tuple(said), b"".join([array.tobytes() for array in arrays])
+        found = blake2b(digest_size=16)
         for array in arrays:
             found.update(np.ascontiguousarray(array).data)
-        return found.digest()
+        return tuple(said), found.digest()
 
     def without_holes(self) -> Polygons:
         return self.select(~np.isin(self.faces, self.holes)) if len(self.holes) else self

@@ -16,10 +16,16 @@ def read_positions(prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode | None
     UsdGeomPointBased says, and are not interpolated: between samples, the number of points may change.
     base: the time whose last sample counts, where that is another than `time`.
     """
-    based = UsdGeom.PointBased(prim)
-    moved = based.ComputePointsAtTime(time, base or time) if is_carried_by_velocities(prim, time) else None
-    value = moved if moved is not None and len(moved) else based.GetPointsAttr().Get(time)
-    return floats(value, 3) if isinstance(value, Vt.Vec3fArray) else None
+    if not is_carried_by_velocities(prim, time):
+        return still_positions(prim, time)
+    moved = UsdGeom.PointBased(prim).ComputePointsAtTime(time, base or time)
+    return floats(moved, 3) if len(moved) else still_positions(prim, time)
+
+
+def still_positions(prim: Usd.Prim, time: Usd.TimeCode) -> NDArray[np.float32] | None:
+    """The same of a prim that no velocities carry."""
+    value = prim.GetAttribute("points").Get(time)
+    return np.asarray(value) if isinstance(value, Vt.Vec3fArray) else None
 
 
 def is_carried_by_velocities(prim: Usd.Prim, time: Usd.TimeCode) -> bool:

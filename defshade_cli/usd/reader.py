@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -17,9 +16,8 @@ from defshade_cli.errors import EmptyStage
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.framing import Framing, Held
-from defshade_cli.scene.geometry import Drawable, Mesh, Subset, enclose, world_boxes
+from defshade_cli.scene.geometry import Drawable, Mesh, enclose, world_boxes
 from defshade_cli.scene.light import Light
-from defshade_cli.scene.material import Material
 from defshade_cli.scene.motion import Moment, moment_of
 from defshade_cli.scene.scene import Scene, Unsupported
 from defshade_cli.scene.studio import studio_lights
@@ -28,15 +26,17 @@ from defshade_cli.spaces import Window, conform_window
 from defshade_cli.usd import stage as facts
 from defshade_cli.usd.camera import choose_camera, default_window, find_cameras, framed_camera, read_camera
 from defshade_cli.usd.complexity import UNIFORM_LEVELS, choose_levels
-from defshade_cli.usd.extent import extent_of
+from defshade_cli.usd.drawables import Glowing, drawables_of
+from defshade_cli.usd.extent import extents_of
 from defshade_cli.usd.facing import PlacedSurface, faced
+from defshade_cli.usd.garbage import uncollected
 from defshade_cli.usd.geometry import Gprim, Surface
 from defshade_cli.usd.identity import read_assets, read_labels
 from defshade_cli.usd.instancing import Piece
 from defshade_cli.usd.light import camera_light
 from defshade_cli.usd.linking import link
 from defshade_cli.usd.memory import Memory
-from defshade_cli.usd.mesh_light import Glow, Glows, glowing_lights, shown_material
+from defshade_cli.usd.mesh_light import Glows, glowing_lights
 from defshade_cli.usd.palette import Palette
 from defshade_cli.usd.render_pass import pass_issues, read_pass
 from defshade_cli.usd.settings import read_settings
@@ -47,8 +47,6 @@ from defshade_cli.usd.unresolved import find_unresolved
 from defshade_cli.usd.view import View
 
 log = logging.getLogger("defshade")
-
-Glowing = tuple[Glow, tuple[Light, ...]]
 
 
 class StageReader:
@@ -143,6 +141,7 @@ class StageReader:
         then = self._read(frame, Usd.TimeCode(frame), levels)
         return moment_of(scene.drawables, scene.meshes, then.camera, then.drawables, then.meshes)
 
+    @uncollected()
     def _read(self, frame: float | None, time: Usd.TimeCode, levels: dict[str, int]) -> Scene:
         """levels: of refinement by path of the surface; those that are missing are chosen, and put in."""
         base = time if frame is None else Usd.TimeCode(frame)
@@ -159,7 +158,7 @@ class StageReader:
         palette = Palette(self._memory, time, self._settings.material_purposes)
         meshes: dict[Mesh, int] = {}
         glowing = _glowing(drawn, gprims, traversal.glows, palette)
-        shown = [*_drawables(drawn, gprims, meshes, palette, glowing)]
+        shown = [*drawables_of(drawn, gprims, meshes, palette, glowing)]
         shining = self._shared_lights([*_lights(pieces), *_all(glowing)])
         lights, drawables = link(self._stage, shining, shown)
         mended = dict.fromkeys(issue for gprim in gprims.values() for issue in gprim.issues)
@@ -233,12 +232,10 @@ class StageReader:
 
     def _bounds(self, placed: Sequence[PlacedSurface], time: Usd.TimeCode) -> NDArray[np.float64]:
         """(2, 3) around the surfaces as authored, however they are refined, empty ones too."""
-        boxes = [
-            np.broadcast_to(extent_of(self._stage, surface, time), (len(piece.root_from_object), 2, 3))
-            for piece, surface in placed
-        ]
+        extents = extents_of(self._stage, [surface for _, surface in placed], time)
+        boxes = np.repeat(extents, [len(piece.root_from_object) for piece, _ in placed], axis=0)
         matrices = np.concatenate([np.empty((0, 4, 4)), *(piece.root_from_object for piece, _ in placed)])
-        return enclose([world_boxes(np.concatenate([np.empty((0, 2, 3)), *boxes]), matrices)])
+        return enclose([world_boxes(boxes, matrices)])
 
     def _lit(self, scene: Scene) -> Scene:
         """The scene with lights of ours where it has none: the studio, or one at the camera as usdrecord has it."""
@@ -269,52 +266,6 @@ def _surfaces(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[Plac
     for piece in pieces:
         if isinstance(piece.content, Surface) and (piece.purpose or "default") in purposes:
             yield piece, piece.content
-
-
-def _drawables(
-    drawn: Iterable[PlacedSurface],
-    gprims: Mapping[Surface, Gprim],
-    meshes: dict[Mesh, int],
-    palette: Palette,
-    glowing: Mapping[Piece, Glowing],
-) -> Iterator[Drawable]:
-    """What is drawn; `meshes` takes the meshes, each with its number."""
-    alike: dict[tuple[int, tuple[Subset, ...], bool | Piece], list[Piece]] = defaultdict(list)
-    unauthored: dict[tuple[Subset, ...], Material] = {}
-    for piece, surface in drawn:
-        gprim = gprims[surface]
-        if not gprim.groups:
-            continue
-        materials = [palette.material(piece.bindings[group.path]) for group in gprim.groups]
-        if piece in glowing:
-            glow, lights = glowing[piece]
-            materials = [shown_material(material, glow, lights[0]) for material in materials]
-        numbered = zip(gprim.groups, map(palette.number_of, materials), strict=True)
-        subsets = tuple(Subset(number, group.first, group.count) for group, number in numbered)
-        named = len(piece.paths) == len(piece.ids)
-        mesh = meshes.setdefault(gprim.mesh, len(meshes))
-        alike[mesh, subsets, named or piece].append(piece)
-        unauthored[subsets] = materials[0]
-    for (mesh, subsets, _), pieces in alike.items():
-        yield _drawable(mesh, subsets, pieces, unauthored[subsets])
-
-
-def _drawable(mesh: int, subsets: tuple[Subset, ...], pieces: Sequence[Piece], unauthored: Material) -> Drawable:
-    """Pieces of the same looks as instances of one mesh. unauthored: has the colour of those that have none."""
-    color, opacity = _joined([p.display_color for p in pieces]), _joined([p.display_opacity for p in pieces])
-    return Drawable(
-        mesh=mesh,
-        world_from_object=_joined([piece.root_from_object for piece in pieces]),
-        subsets=subsets,
-        paths=tuple(path for piece in pieces for path in piece.paths),
-        instance_ids=_joined([piece.ids for piece in pieces]),
-        display_color=np.where(np.isnan(color), unauthored.diffuse_color, color),
-        display_opacity=np.where(np.isnan(opacity), unauthored.opacity, opacity),
-    )
-
-
-def _joined(arrays: Sequence[NDArray]) -> NDArray:
-    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
 def _paths(drawables: Iterable[Drawable]) -> dict[str, None]:

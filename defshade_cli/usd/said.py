@@ -18,4 +18,4 @@ class Said(NamedTuple):
 def said_of(prim: Usd.Prim, *, primvars_above: bool = True) -> Said:
     """primvars_above: may an ancestor have some?"""
     names = prim.GetAuthoredPropertyNames()
-    return Said(names, primvars_above or any(name.startswith("primvars:") for name in names))
+    return Said(names, primvars_above or "\nprimvars:" in "\n" + "\n".join(names))

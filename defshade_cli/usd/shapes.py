@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from weakref import WeakValueDictionary
 
 from defshade_cli.usd.polygons import Polygons
@@ -11,7 +12,7 @@ class Shapes:
     """The polygons of the surfaces that are in use."""
 
     def __init__(self) -> None:
-        self._known: WeakValueDictionary[bytes, Polygons] = WeakValueDictionary()
+        self._known: WeakValueDictionary[Hashable, Polygons] = WeakValueDictionary()
 
     def shared(self, polygons: Polygons) -> Polygons:
         """The polygons that were given first, of those that equal these."""

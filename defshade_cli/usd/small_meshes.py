@@ -24,11 +24,28 @@ _MOST_CORNERS = 4
 """A face: the ears of larger ones are found in an order that depends on what stands beside them."""
 
 
+class Corners(NamedTuple):
+    """The arrays of a scene.Mesh, read-only, of polygons on which nothing lies but normals that follow from them.
+
+    split: points are one a corner.
+    """
+
+    points: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    triangles: NDArray[np.uint32]
+    faces: NDArray[np.int32]
+    split: bool
+
+
 class Shaped(NamedTuple):
-    """What follows from some polygons alone. normals: those of with_normals.  triangles: see triangulate."""
+    """What follows from some polygons alone. normals: those of with_normals.  triangles: see triangulate.
+
+    corners: None where something lies on the polygons.
+    """
 
     normals: Primvar
     triangles: Triangles
+    corners: Corners | None
 
 
 def shape_all(meshes: Iterable[Polygons]) -> dict[Polygons, Shaped]:
@@ -59,15 +76,43 @@ def _shape(meshes: Sequence[Polygons]) -> Iterator[Shaped]:
     whole = with_normals(_end_to_end(meshes, points[:-1]))
     cut, face = triangulate(whole, [])
     ends = np.searchsorted(face, faces)
-    cut -= np.repeat(corners[:-1], np.diff(ends))[:, None]
-    face -= np.repeat(faces[:-1], np.diff(ends)).astype(np.int32)
+    triangles = np.diff(ends)
     assert whole.normals is not None
     values, interpolation = whole.normals.values, whole.normals.interpolation
-    at = faces if interpolation == "uniform" else points
-    runs = zip(meshes, pairwise(at.tolist()), pairwise(ends.tolist()), strict=True)
-    for mesh, (low, high), (first, end) in runs:
-        normals = mesh.normals or Primvar(values[low:high], interpolation)
-        yield Shaped(normals, (cut[first:end], face[first:end]))
+    split = whole.normals.splits_points
+    at = faces if split else points
+    first_vertices = corners if split else points
+    drawn = _drawn(whole, cut, face, np.repeat(first_vertices[:-1], triangles), split=split)
+    cut -= np.repeat(corners[:-1], triangles)[:, None]
+    face -= np.repeat(faces[:-1], triangles).astype(np.int32)
+    starts = (pairwise(bounds.tolist()) for bounds in (at, ends, first_vertices))
+    for mesh, (low, high), (first, end), (top, bottom) in zip(meshes, *starts, strict=True):
+        run = slice(first, end)
+        mine = None
+        if mesh.normals is None and not mesh.primvars:
+            vertices = slice(top, bottom)
+            mine = Corners(
+                drawn.points[vertices], drawn.normals[vertices], drawn.triangles[run], drawn.faces[run], split
+            )
+        yield Shaped(mesh.normals or Primvar(values[low:high], interpolation), (cut[run], face[run]), mine)
+
+
+def _drawn(
+    whole: Polygons, cut: NDArray[np.intp], face: NDArray[np.int32], first: NDArray[np.intp], *, split: bool
+) -> Corners:
+    """The arrays of all meshes end to end, as usd/cut.py makes them of each. first: (T,) vertex of its mesh."""
+    assert whole.normals is not None
+    wound = cut[:, ::-1] if whole.left_handed else cut
+    triangles = (wound if split else whole.indices[wound]) - first[:, None]
+    arrays = (
+        whole.points[whole.indices] if split else whole.points,
+        whole.at_corners(whole.normals) if split else whole.normals.values,
+        triangles.astype(np.uint32),
+        whole.faces[face],
+    )
+    for array in arrays:
+        array.flags.writeable = False
+    return Corners(*arrays, split)
 
 
 def _ends(meshes: Sequence[Polygons], name: str) -> NDArray[np.intp]:
@@ -83,7 +128,7 @@ def _end_to_end(meshes: Sequence[Polygons], first_points: NDArray[np.intp]) -> P
         points=np.concatenate([mesh.points for mesh in meshes]),
         counts=counts,
         indices=np.concatenate([mesh.indices for mesh in meshes]) + np.repeat(first_points, sizes),
-        faces=np.arange(len(counts), dtype=np.int32),
+        faces=np.concatenate([mesh.faces for mesh in meshes]),
         scheme=meshes[0].scheme,
         left_handed=meshes[0].left_handed,
         normals=meshes[0].normals,

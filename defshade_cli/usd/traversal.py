@@ -196,7 +196,7 @@ class Traversal:
         placed = matrix(here.root_from_prim)
         return Piece(
             content,
-            placed @ copies.object_from_copy,
+            placed[None] if len(copies.ids) == 1 and copies.ids[0] < 0 else placed @ copies.object_from_copy,
             (content.path if isinstance(content, Surface) else self._memory.shown(prim.GetPath()),),
             copies.ids,
             copies.display_color,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,6 +26,12 @@ def is_finite(value: object) -> bool:
     """No number in `value` is infinite or NaN; what holds no numbers is finite too."""
     array = np.asarray(value)
     return array.dtype.kind != "f" or bool(np.isfinite(array).all())
+
+
+def are_finite(numbers: NDArray) -> bool:
+    """All numbers of a contiguous array. Their squares' sum tells it at once, unless it overflows."""
+    flat = numbers.ravel()
+    return math.isfinite(np.dot(flat, flat)) or bool(np.isfinite(flat).all())
 
 
 def integers(value: object) -> NDArray[np.integer] | None:
