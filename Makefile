@@ -82,6 +82,7 @@ kill-check: .venv/.ready-dev
 
 bench-farm: .venv/.ready-dev
 	$(BIN)/python benchmarks/throughput.py
+	$(BIN)/python benchmarks/chunks.py
 	$(BIN)/python benchmarks/dask_scale.py
 
 farm-check: .venv/.ready-dev

@@ -83,6 +83,25 @@ def test_a_worker_that_is_killed_costs_no_frame(cluster: distributed.LocalCluste
     assert not [o.error for o in outcomes if o.error]
 
 
+def test_a_child_process_serves_chunk_after_chunk_and_ends_when_none_comes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("defshade_cli.farm.dask._IDLE_SECONDS", 1.0)
+    first, second = make_chunks([job("animated", "out")], 3)
+
+    def children() -> set[str]:
+        return set(Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split())
+
+    others = children()
+    assert not any(outcome.error for outcome in render_apart(first, 1, "once", "WARNING"))
+    started = children() - others
+    assert len(started) == 1
+    assert not any(outcome.error for outcome in render_apart(second, 1, "once", "WARNING"))
+    assert children() - others == started
+    deadline = time.monotonic() + 20.0
+    while children() - others and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert not children() - others
+
+
 def test_a_scheduler_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("defshade_cli.farm.dask._PATIENCE", 0.5)
     with pytest.raises(UsageError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9"):

@@ -9,12 +9,14 @@ and the stages and outputs under the same paths.
 
 from __future__ import annotations
 
+import atexit
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from threading import Lock, Timer
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from defshade_cli.errors import UsageError
 from defshade_cli.farm.local import LocalEngine, core_count
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 _PATIENCE = 10.0  # seconds that a scheduler has to answer
+_IDLE_SECONDS = 60.0  # that a child process waits for a chunk
 
 
 class DaskEngine:
@@ -90,10 +93,60 @@ class DaskEngine:
 
 
 def render_apart(chunk: Chunk, threads: int, command: str, log_level: str) -> list[Outcome]:
-    """What a Dask worker runs: the chunk in a child process. threads: of the software driver."""
-    with LocalEngine(1, threads=threads, command=command, log_level=log_level) as engine:
+    """What a Dask worker runs: the chunk in a child process. threads: of the software driver.
+
+    The process stays for the next chunk, which spares it the start, and ends when none has come for a while.
+    """
+    engine = _idle.take(threads, command, log_level)
+    try:
         engine.submit(chunk)
-        return list(engine.outcomes())
+        outcomes = list(engine.outcomes())
+    except BaseException:
+        engine.end()
+        raise
+    _idle.leave(engine, threads, command, log_level)
+    return outcomes
+
+
+class _Idle:
+    """Child processes that wait for a chunk; a Dask worker has as many as threads that render at a time."""
+
+    def __init__(self) -> None:
+        self._waiting: list[tuple[tuple[int, str, str], LocalEngine, Timer]] = []
+        self._lock = Lock()
+        atexit.register(self._end_all)
+
+    def take(self, *arguments: Any) -> LocalEngine:
+        """One that was started with these arguments, else a new one."""
+        with self._lock:
+            for place, (started_with, engine, timer) in enumerate(self._waiting):
+                if started_with == arguments:
+                    timer.cancel()
+                    del self._waiting[place]
+                    return engine
+        threads, command, log_level = arguments
+        return LocalEngine(1, threads=threads, command=command, log_level=log_level)
+
+    def leave(self, engine: LocalEngine, *arguments: Any) -> None:
+        timer = Timer(_IDLE_SECONDS, self._end, [engine])
+        timer.daemon = True
+        with self._lock:
+            self._waiting.append((arguments, engine, timer))
+        timer.start()
+
+    def _end(self, engine: LocalEngine) -> None:
+        with self._lock:
+            kept = [entry for entry in self._waiting if entry[1] is not engine]
+            was_waiting, self._waiting = len(kept) < len(self._waiting), kept
+        if was_waiting:
+            engine.end()
+
+    def _end_all(self) -> None:
+        for _, engine, _ in list(self._waiting):
+            self._end(engine)
+
+
+_idle = _Idle()
 
 
 def _connected(stack: ExitStack, scheduler: str | None, workers: int, resources: dict[str, float] | None) -> Client:

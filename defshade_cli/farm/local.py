@@ -64,6 +64,10 @@ class LocalEngine:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.end()
+
+    def end(self) -> None:
+        """End the processes; what they had still to do is lost."""
         for worker in self._workers:
             worker.process.terminate()
         for worker in self._workers:
