@@ -4,7 +4,8 @@
 
 Stages are generated in FOLDER, and converted for peers that read no USD; neither is timed. --python names the
 interpreter of the peers, where they live in an environment of their own. Of each process the processor seconds, the
-wall time and the peak of resident memory are the kernel's own figures; medians of the rounds count.
+wall time and the peak of resident memory are the kernel's own figures; medians of the rounds count, after one
+that warms up: Python's modules and shaders are compiled then, as an installation has them.
 """
 
 from __future__ import annotations
@@ -88,6 +89,7 @@ def measure(command: Sequence[str]) -> Usage | None:
     start = time.perf_counter()
     paths = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))} if _is_ours(command) else {}
     environment = os.environ | {"PYOPENGL_PLATFORM": "egl"} | paths
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment)
     ended, usage = _wait(process, start + LIMIT)
     if ended != 0:
@@ -103,11 +105,13 @@ def compare(folder: Path, names: Iterable[str], chosen: Sequence[Tool], rounds: 
         if any(tool.suffix == ".glb" for tool in chosen):
             write_glb(stage, stage.with_suffix(".glb"))
         usages: dict[str, list[Usage | None]] = {tool.name: [] for tool in chosen}
-        for number in range(rounds):
+        for number in range(-1, rounds):
             for tool in chosen:
                 image = stage.parent / f"{tool.name.replace(' ', '_').replace('`', '')}{tool.image}"
-                usages[tool.name].append(measure(tool.command(stage.with_suffix(tool.suffix), image)))
-                print(name, number, tool.name, usages[tool.name][-1], file=sys.stderr, flush=True)
+                used = measure(tool.command(stage.with_suffix(tool.suffix), image))
+                print(name, number, tool.name, used, file=sys.stderr, flush=True)
+                if number >= 0:
+                    usages[tool.name].append(used)
         results[name] = {tool: _median(taken) for tool, taken in usages.items() if all(taken)}
     return results
 

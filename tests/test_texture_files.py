@@ -112,6 +112,19 @@ def test_large_images_are_reduced_and_a_full_budget_halves_them(
     assert load(file).texels.shape == (32, 64, 4)
 
 
+@pytest.mark.parametrize(("suffix", "off"), [(".png", {"atol": 1.0}), (".exr", {"rtol": 1e-3})])
+def test_an_image_twice_or_four_times_too_large_becomes_means(
+    suffix: str, off: dict[str, float], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of 4x4 texels: bytes are rounded twice, by half a step each time; half floats have eleven bits."""
+    noisy = np.random.default_rng(4).integers(0, 256, (64, 32, 3), dtype=np.uint8)
+    file = save(tmp_path / f"noise{suffix}", noisy if suffix == ".png" else noisy.astype(np.float32))
+    monkeypatch.setattr(images, "LARGEST", 16)
+    found = load(file).texels[::-1, :, :3].astype(np.float64)
+    means = noisy.reshape(16, 4, 8, 4, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(found, means, **{"rtol": 0.0, **off})
+
+
 def test_groups_never_pass_the_units() -> None:
     shapes = [(2 + i, 3 + j) for i in range(5) for j in range(5)]
     found = {

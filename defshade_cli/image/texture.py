@@ -138,10 +138,23 @@ def _in_rec709(texels: NDArray, source: Source) -> NDArray[np.float32]:
 
 
 def _reduced(pixels: NDArray, side: int) -> NDArray:
-    """No side longer than `side`."""
+    """No side longer than `side`: by means of 2x2, as mip levels are made, as far as those go."""
     height, width = pixels.shape[:2]
+    while max(height, width) >= 2 * side and height % 2 == width % 2 == 0:
+        pixels = _halved(pixels)
+        height, width = pixels.shape[:2]
     scale = side / max(width, height)
+    if scale >= 1.0:
+        return pixels
     return _resampled(pixels, max(1, round(width * scale)), max(1, round(height * scale)))
+
+
+def _halved(pixels: NDArray) -> NDArray:
+    """Means of 2x2 of (even, even, C); bytes are rounded half up."""
+    wide = np.uint16 if pixels.dtype == np.uint8 else np.float32
+    rows = np.add(pixels[0::2], pixels[1::2], dtype=wide)
+    sums = rows[:, 0::2] + rows[:, 1::2]
+    return ((sums + 2) >> 2).astype(np.uint8) if wide is np.uint16 else sums * np.float32(0.25)
 
 
 def _resampled(pixels: NDArray, width: int, height: int) -> NDArray:
