@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import struct
 import zlib
 from pathlib import Path
@@ -97,7 +98,7 @@ def test_a_missing_and_a_broken_file_are_logged_and_left_out(tmp_path: Path, cap
     (tmp_path / "broken.png").write_bytes(b"no image")
     sources = [Source(ImageFile(str(tmp_path / name)), "auto") for name in ("missing.png", "broken.png")]
     with caplog.at_level(logging.WARNING, "defshade"):
-        assert load_images(sources) == {}
+        assert load_images(dict.fromkeys(sources, math.inf)) == {}
     assert "missing.png" in caplog.text and "broken.png" in caplog.text
 
 
@@ -116,13 +117,37 @@ def test_large_images_are_reduced_and_a_full_budget_halves_them(
 def test_an_image_twice_or_four_times_too_large_becomes_means(
     suffix: str, off: dict[str, float], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of 4x4 texels: bytes are rounded twice, by half a step each time; half floats have eleven bits."""
+    """Of the light of 4x4 texels: bytes are rounded twice, by half a step each time; half floats have eleven bits."""
     noisy = np.random.default_rng(4).integers(0, 256, (64, 32, 3), dtype=np.uint8)
     file = save(tmp_path / f"noise{suffix}", noisy if suffix == ".png" else noisy.astype(np.float32))
     monkeypatch.setattr(images, "LARGEST", 16)
     found = load(file).texels[::-1, :, :3].astype(np.float64)
-    means = noisy.reshape(16, 4, 8, 4, 3).mean(axis=(1, 3))
+    light = linear(noisy / 255) if suffix == ".png" else noisy
+    means = light.reshape(16, 4, 8, 4, 3).mean(axis=(1, 3))
+    if suffix == ".png":
+        means = 255 * np.where(means <= 0.0031308, 12.92 * means, 1.055 * means ** (1 / 2.4) - 0.055)
     np.testing.assert_allclose(found, means, **{"rtol": 0.0, **off})
+
+
+def test_an_image_is_read_no_larger_than_it_is_worth(tmp_path: Path) -> None:
+    """Halved as often as it takes; means are of light, so that black and white squares stay as bright as they are."""
+    checker = (np.indices((256, 256)).sum(0) % 2 * 255).astype(np.uint8)[..., None].repeat(3, 2)
+    source = Source(save(tmp_path / "checker.png", checker), "auto")
+    (found,) = load_images({source: 64.0}).values()
+    assert found.texels.shape == (64, 64, 4) and found.srgb
+    np.testing.assert_allclose(linear(found.texels[..., :3] / 255), 0.5, atol=4e-3)
+    raw = Source(source.file, "raw")
+    assert (load_images({raw: 64.0})[raw].texels[..., :3] == 128).all()
+
+
+def test_a_file_with_mip_levels_is_read_at_one_of_them(tmp_path: Path) -> None:
+    pixels = np.zeros((256, 256, 3), np.float32)
+    oiio.ImageBufAlgo.make_texture(oiio.MakeTxTexture, oiio.ImageBuf(pixels), str(tmp_path / "a.exr"))
+    with_mips = oiio.ImageBuf(str(tmp_path / "a.exr"))
+    assert with_mips.nmiplevels > 3
+    source = Source(ImageFile(str(tmp_path / "a.exr")), "auto")
+    assert load_images({source: 64.0})[source].texels.shape[:2] == (64, 64)
+    assert load_images({source: 100.0})[source].texels.shape[:2] == (100, 100)
 
 
 def test_groups_never_pass_the_units() -> None:
@@ -145,6 +170,6 @@ def test_a_header_that_claims_100000_texels_a_side_is_a_warning(
     header = chunk(b"IHDR", struct.pack(">IIBBBBB", 100_000, 100_000, 8, 2, 0, 0, 0))
     body = chunk(b"IDAT", zlib.compress(bytes(999))) + chunk(b"IEND", b"")
     (tmp_path / "huge.png").write_bytes(b"\x89PNG\r\n\x1a\n" + header + body)
-    assert load_images([Source(ImageFile(str(tmp_path / "huge.png")), "auto")]) == {}
+    assert load_images({Source(ImageFile(str(tmp_path / "huge.png")), "auto"): math.inf}) == {}
     assert "exceeds the 8192 MB limit" in caplog.text
     assert "\n" not in caplog.records[0].getMessage()

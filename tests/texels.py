@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -37,4 +38,4 @@ def linear(encoded: NDArray) -> NDArray:
 
 def load(file: ImageFile, color_space: str = "auto") -> TexelImage:
     source = Source(file, color_space)  # type: ignore[arg-type]
-    return load_images([source])[source]
+    return load_images({source: math.inf})[source]

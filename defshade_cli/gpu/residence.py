@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
+from types import MappingProxyType
 
 import moderngl
 import numpy as np
@@ -18,6 +19,7 @@ from defshade_cli.gpu.vertices import FEW_UV_SETS, in_slots, sets_of, uv_names, 
 from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
+from defshade_cli.scene.texture import Texture
 
 VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS, TEXTURE_INPUTS, TILES, LINKS, MOTIONS, LIGHT_LISTS = range(10)
 """Binding points of the storage buffers, as the shaders declare them."""
@@ -32,6 +34,8 @@ _COMMAND = np.dtype([(name, "u4") for name in ("count", "instances", "first_inde
 
 
 _TURNS = 8
+
+NO_TEXELS: Mapping[Texture, float] = MappingProxyType({})
 
 
 class RecordBuffer:
@@ -109,19 +113,21 @@ class GpuScene:
         inputs: Collection[str] = (),
         moved: Sequence[NDArray[np.float32]] = (),
         primvars: tuple[str, ...] = (),
+        texels: Mapping[Texture, float] = NO_TEXELS,
     ) -> DrawList:
         """Make the scene's geometry, placements and materials resident, relative to its camera.
 
         inputs: what layers read of the vertices, as gpu.planes.Plane.inputs names it.
         moved: (V, 3) points of all meshes a frame before and after, where MOTION is among them.
         primvars: names of those that layers show, at most MOST_PRIMVARS.
+        texels: a side that textures are worth; those that it does not name are read whole.
         """
         layer_uv = "LAYER_UV" in inputs
         self._instances.write(instance_records(scene.drawables, scene.camera.position))
         names_read = uv_names(scene.drawables, scene.materials, len(scene.meshes))
         slots = uv_slots(names_read)
         uvs, uv_sets = tuple(in_slots(names, slots) for names in names_read), sets_of(slots)
-        textures = self._update_materials(scene, slots)
+        textures = self._update_materials(scene, slots, texels)
         color_varies = any(m.display_color is not None or m.display_opacity is not None for m in scene.meshes)
         textured = bool(textures.arrays)
         made_for = (uvs if textured else (), color_varies, textured, layer_uv, primvars)
@@ -152,8 +158,8 @@ class GpuScene:
             tuple(vertices), indices, commands, corners, color_varies=color_varies, textures=textures, many_uvs=many_uvs
         )
 
-    def _update_materials(self, scene: Scene, slots: Mapping[str, int]) -> TextureSet:
-        textures = self._textures.update(scene.textures)
+    def _update_materials(self, scene: Scene, slots: Mapping[str, int], texels: Mapping[Texture, float]) -> TextureSet:
+        textures = self._textures.update(scene.textures, texels)
         inputs, counts = input_records(scene.materials, textures, slots)
         self._materials.write(material_records(scene.materials, counts))
         if textures.arrays:

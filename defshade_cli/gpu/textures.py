@@ -7,6 +7,7 @@ Each program has a sampler a group and chooses by a switch, since samplers take 
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -51,19 +52,28 @@ class TextureStore:
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
-        self._textures: tuple[Texture, ...] = ()
+        self._worth: dict[Texture, float] = {}
         self._set = TextureSet()
 
-    def update(self, textures: tuple[Texture, ...]) -> TextureSet:
-        """Make the textures resident. Raises GpuError where the device's memory ends."""
-        if textures != self._textures:
+    def update(self, textures: tuple[Texture, ...], texels: Mapping[Texture, float]) -> TextureSet:
+        """Make the textures resident. texels: a side that they are worth, infinite for those that it does not name.
+
+        Raises GpuError where the device's memory ends.
+        """
+        worth = {texture: texels.get(texture, math.inf) for texture in textures}
+        if worth != self._worth:
             for array in self._set.arrays:
                 array.release()
-            self._set, self._textures = self._load(textures), textures
+            self._set, self._worth = self._load(worth), worth
         return self._set
 
-    def _load(self, textures: tuple[Texture, ...]) -> TextureSet:
-        images = load_images([Source(file, t.color_space) for t in textures for _, file in t.tiles])
+    def _load(self, worth: Mapping[Texture, float]) -> TextureSet:
+        textures = tuple(worth)
+        sides: dict[Source, float] = {}
+        for texture, side in worth.items():
+            for source in (Source(file, texture.color_space) for _, file in texture.tiles):
+                sides[source] = max(side, sides.get(source, 0.0))
+        images = load_images(sides)
         groups = group_images(images, self._gpu.context.max_texture_units)
         rows = {}
         for number, group in enumerate(groups):

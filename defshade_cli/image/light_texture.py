@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -36,7 +37,7 @@ def read_radiance_map(file: ImageFile) -> RadianceMap | None:
 @lru_cache(maxsize=8)
 def _read(file: ImageFile, _changed: int) -> RadianceMap | None:
     source = Source(file, "auto")
-    images = load_images([source])
+    images = load_images({source: math.inf})
     return RadianceMap(_linear(images[source])) if source in images else None
 
 

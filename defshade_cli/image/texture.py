@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import logging
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import PurePath
 from typing import NamedTuple
 
@@ -65,28 +66,32 @@ class _Header:
     eight_bit: bool
     wrap: tuple[Wrap, Wrap]
 
-    def bytes_at(self, side: int) -> float:
+    def bytes_at(self, side: float) -> float:
         """On the device, no side longer than `side`."""
         shrunk = min(1.0, side / max(self.width, self.height))
         texel = (1 if self.channels == 1 else 4) * (1 if self.eight_bit else 2)
         return self.width * self.height * shrunk * shrunk * texel * _MIPS
 
 
-def load_images(sources: Sequence[Source]) -> dict[Source, TexelImage]:
-    """Every image that can be read, within BUDGET; what cannot is logged and left out."""
+def load_images(sources: Mapping[Source, float]) -> dict[Source, TexelImage]:
+    """Every image that can be read, of the texels a side that it is worth, within BUDGET.
+
+    What cannot be read is logged and left out.
+    """
     headers = {}
-    for source in dict.fromkeys(sources):
+    for source in sources:
         try:
             headers[source] = _read_header(source.file)
         except OSError as error:
             log.warning("texture %s: %s", source.file.path, error)
+    worth = {source: min(LARGEST, max(side, _SMALLEST)) for source, side in sources.items()}
     side = LARGEST
-    while side > _SMALLEST and sum(header.bytes_at(side) for header in headers.values()) > BUDGET:
+    while side > _SMALLEST and sum([h.bytes_at(min(side, worth[s])) for s, h in headers.items()]) > BUDGET:
         side //= 2
     images = {}
     for source, header in headers.items():
         try:
-            images[source] = _read_image(source, header, side)
+            images[source] = _read_image(source, header, int(min(side, worth[source])))
         except OSError as error:
             log.warning("texture %s: %s", source.file.path, error)
     return images
@@ -110,14 +115,15 @@ def _read_header(file: ImageFile) -> _Header:
 def _read_image(source: Source, header: _Header, side: int) -> TexelImage:
     kind = oiio.UINT8 if header.eight_bit else oiio.FLOAT
     with _opened(source.file) as image:
-        pixels = image.read_image(0, 0, 0, min(header.channels, 4), kind)
+        pixels = image.read_image(0, _level(image, side), 0, min(header.channels, 4), kind)
         if pixels is None:
             raise OSError(image.geterror())
     colored = header.channels >= 3
     srgb = source.color_space == "sRGB" or (source.color_space == "auto" and header.eight_bit and colored)
     if max(header.width, header.height) > side:
         log.info("texture %s: reduced to %d texels a side", source.file.path, side)
-        pixels = _reduced(pixels, side)
+    if max(pixels.shape[:2]) > side:
+        pixels = _reduced(pixels, side, srgb=srgb and header.eight_bit)
     texels = _four_channels(pixels) if colored or header.channels == 2 or srgb else pixels
     eight_bit = header.eight_bit
     if source.color_space not in STATED_SPACES:
@@ -137,11 +143,22 @@ def _in_rec709(texels: NDArray, source: Source) -> NDArray[np.float32]:
     return np.asarray(moved.get_pixels(oiio.FLOAT))
 
 
-def _reduced(pixels: NDArray, side: int) -> NDArray:
-    """No side longer than `side`: by means of 2x2, as mip levels are made, as far as those go."""
+def _level(image: oiio.ImageInput, side: int) -> int:
+    """Of a file that holds mip levels the smallest that is no smaller than `side`."""
+    level = 0
+    while image.seek_subimage(0, level + 1) and max(image.spec().width, image.spec().height) >= side:
+        level += 1
+    return level
+
+
+def _reduced(pixels: NDArray, side: int, *, srgb: bool) -> NDArray:
+    """No side longer than `side`: by means of 2x2, as mip levels are made, as far as those go.
+
+    srgb: bytes are sRGB-encoded, and light is what is averaged.
+    """
     height, width = pixels.shape[:2]
     while max(height, width) >= 2 * side and height % 2 == width % 2 == 0:
-        pixels = _halved(pixels)
+        pixels = _halved_in_light(pixels) if srgb else _halved(pixels)
         height, width = pixels.shape[:2]
     scale = side / max(width, height)
     if scale >= 1.0:
@@ -150,11 +167,24 @@ def _reduced(pixels: NDArray, side: int) -> NDArray:
 
 
 def _halved(pixels: NDArray) -> NDArray:
-    """Means of 2x2 of (even, even, C); bytes are rounded half up."""
-    wide = np.uint16 if pixels.dtype == np.uint8 else np.float32
+    """Means of 2x2 of (even, even, C); integers are rounded half up."""
+    wide = {"uint8": np.uint16, "uint16": np.uint32}.get(pixels.dtype.name, np.float32)
     rows = np.add(pixels[0::2], pixels[1::2], dtype=wide)
     sums = rows[:, 0::2] + rows[:, 1::2]
-    return ((sums + 2) >> 2).astype(np.uint8) if wide is np.uint16 else sums * np.float32(0.25)
+    return sums * np.float32(0.25) if wide is np.float32 else ((sums + 2) >> 2).astype(pixels.dtype)
+
+
+def _halved_in_light(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The same of sRGB-encoded colours; alpha is not encoded."""
+    color = _encoding()[_halved(_LIGHT[pixels[..., :3]])]
+    return np.concatenate([color, _halved(pixels[..., 3:])], axis=2)
+
+
+@cache
+def _encoding() -> NDArray[np.uint8]:
+    """(65536,) of each such light the nearest code."""
+    edges = (_LIGHT[1:].astype(np.uint32) + _LIGHT[:-1] + 1) // 2
+    return np.searchsorted(edges, np.arange(65536), "right").astype(np.uint8)
 
 
 def _resampled(pixels: NDArray, width: int, height: int) -> NDArray:
@@ -177,7 +207,11 @@ def _linear(texels: NDArray) -> NDArray:
     """sRGB's transfer curve undone on the colours: IEC 61966-2-1."""
     color = texels[..., :3]
     curved = ((np.maximum(color, 0.04045) + 0.055) / 1.055) ** 2.4
-    return np.concatenate([np.where(color <= 0.04045, color / 12.92, curved), texels[..., 3:]], axis=2)
+    return np.concatenate([np.where(color <= 0.04045, color / 12.92, curved), texels[..., 3:]], axis=-1)
+
+
+_LIGHT = np.round(65535.0 * _linear(np.arange(256)[:, None] / 255.0)[:, 0]).astype(np.uint16)
+"""(256,) of each code of sRGB the light, 65535 for white."""
 
 
 def _half(texels: NDArray) -> NDArray[np.float16]:

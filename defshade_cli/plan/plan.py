@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -20,12 +20,15 @@ from defshade_cli.plan.groups import light_groups, light_outputs
 from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
 from defshade_cli.plan.moments import count_moments, share_moments
 from defshade_cli.plan.opacity import is_transparent, thin_materials
+from defshade_cli.plan.texels import seen_texels
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.shadow import PLAIN
+from defshade_cli.scene.texture import Texture
+from defshade_cli.scene.view import View
 from defshade_cli.scene.window import DataWindow, from_ndc
 from defshade_cli.settings import FILTERS, Complexity, Debug, Filter, Layout, Lighting, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
@@ -50,7 +53,7 @@ class Plan:
     shadows: some light casts them.  shadow_linked: in some light not all geometry does.
     background: domes are seen where no geometry is.
     cutout: some opacity may be below 1.  transparent: and scales the diffuse alone.
-    textures: some material reads them.
+    texels: of each texture that is read, a side that it is worth, see plan/texels.py.
     data_pass: data layers need an unjittered float GBuffer of their own.
     portals: how many hints for sampling domes the stage has.
     levels: how often subdivision surfaces were refined, ascending; empty without any.
@@ -83,7 +86,7 @@ class Plan:
     background: bool
     cutout: bool
     transparent: bool
-    textures: bool
+    texels: Mapping[Texture, float]
     data_pass: bool
     complexity: Complexity
     portals: int
@@ -102,6 +105,11 @@ class Plan:
         share = window.width * window.height / (self.window.width * self.window.height)
         limit = None if self.time_limit is None else self.time_limit * share
         return replace(self, window=window, camera=camera, time_limit=limit)
+
+    @property
+    def textures(self) -> bool:
+        """Does some material read them?"""
+        return bool(self.texels)
 
     @property
     def lit(self) -> bool:
@@ -244,7 +252,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         background=settings.background,
         cutout=bool(thin),
         transparent=is_transparent(thin, settings.shading),
-        textures=bool(scene.textures),
+        texels=seen_texels(scene, View(display_camera, display[1])),
         data_pass=data_pass,
         complexity=settings.complexity,
         ranks=settings.cryptomatte_levels,
@@ -259,9 +267,10 @@ ShutterSample = tuple[Scene, Plan]
 
 
 def plan_moments(plan: Plan, seen: Iterator[Scene], settings: RenderSettings) -> Iterator[ShutterSample]:
-    """What the samples see in turn: `seen` with plans that fill the same planes."""
+    """What the samples see in turn: `seen` with plans that fill the same planes, of the same texels."""
     for moment in seen:
-        yield moment, replace(make_plan(moment, settings), planes=plan.planes, transparent=plan.transparent)
+        planned = make_plan(moment, settings)
+        yield moment, replace(planned, planes=plan.planes, transparent=plan.transparent, texels=plan.texels)
 
 
 def _seen_lights(lights: tuple[PlannedLight, ...], layers: tuple[str, ...]) -> tuple[PlannedLight, ...]:

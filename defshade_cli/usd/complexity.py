@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.scene.geometry import world_boxes
+from defshade_cli.scene.view import View
 from defshade_cli.settings import Complexity
 from defshade_cli.usd.geometry import Surface
-from defshade_cli.usd.view import View
 
 UNIFORM_LEVELS: dict[Complexity, int] = {"low": 0, "medium": 1, "high": 2, "veryhigh": 3}
 """Levels everywhere, as usdrecord's complexities 1.0, 1.1, 1.2 and 1.3."""

@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.scene.view import View
 from defshade_cli.spaces import transform_points
 from defshade_cli.usd.copies import rounded
 from defshade_cli.usd.geometry import Surface
 from defshade_cli.usd.instancing import Piece, some
-from defshade_cli.usd.view import View
 
 PlacedSurface = tuple[Piece, Surface]
 

@@ -21,6 +21,7 @@ from defshade_cli.scene.light import Light
 from defshade_cli.scene.motion import Moment, moment_of
 from defshade_cli.scene.scene import Scene, Unsupported
 from defshade_cli.scene.studio import studio_lights
+from defshade_cli.scene.view import View
 from defshade_cli.settings import Complexity
 from defshade_cli.spaces import Window, conform_window
 from defshade_cli.usd import stage as facts
@@ -44,7 +45,6 @@ from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.tessellation import Tessellation
 from defshade_cli.usd.traversal import Traversal
 from defshade_cli.usd.unresolved import find_unresolved
-from defshade_cli.usd.view import View
 
 log = logging.getLogger("defshade")
 

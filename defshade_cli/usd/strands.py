@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.scene.view import View
 from defshade_cli.spaces import Matrix, cross, normalize, transform_directions, transform_points
 from defshade_cli.usd.basis import (
     LARGEST_DETAIL,
@@ -30,7 +31,6 @@ from defshade_cli.usd.basis import (
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.primvars import Carried
 from defshade_cli.usd.tubes import following
-from defshade_cli.usd.view import View
 
 Vectors = NDArray[np.float64]
 
