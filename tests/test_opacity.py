@@ -155,3 +155,14 @@ def test_panes_converge_to_path_traced_light(pipeline: Pipeline) -> None:
     blocks = [image.reshape(3, 8, 3, 8, 3).mean(axis=(1, 3)) for image in (ours, theirs)]
     np.testing.assert_allclose(*blocks, rtol=0.03)
     np.testing.assert_allclose(ours.mean(axis=(0, 1)), theirs.mean(axis=(0, 1)), rtol=0.03)
+
+
+@pytest.mark.parametrize("shadows", [False, True])
+def test_what_is_solid_is_drawn_apart_from_what_is_thin(pipeline: Pipeline, shadows: bool) -> None:
+    """Only thin materials pay for coins of opacity; the image is the one in which all of them pay."""
+    of = pane_over_floor(GLASS)
+    plan = make_plan(of, RenderSettings(size=SIZE, samples=2, shadows=shadows))
+    all_thin = replace(plan, thin=(0, 1))
+    assert plan.thin == (1,)
+    apart, together = (pipeline.render(of, way).layers["beauty"] for way in (plan, all_thin))
+    np.testing.assert_array_equal(apart, together)

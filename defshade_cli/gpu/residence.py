@@ -68,7 +68,7 @@ class DrawList:
     """All opaque geometry as one multi-draw.
 
     vertices: (buffer, format, attribute names) triples as moderngl takes them; indices: 32-bit.
-    table: (C,) indirect commands, one draw a subset, instanced.
+    table: (C,) indirect commands, one draw a subset, instanced.  thin: (C,) whose materials may let something through.
     corners: (C, 8, 3) of a box around what each command draws, relative to the eye; not finite where nothing is known.
     many_uvs: vertices hold UV_SETS sets of texture coordinates, not FEW_UV_SETS.
     """
@@ -76,6 +76,7 @@ class DrawList:
     vertices: tuple[tuple, ...]
     indices: moderngl.Buffer
     table: NDArray
+    thin: NDArray[np.bool_]
     corners: NDArray[np.float64]
     color_varies: bool
     textures: TextureSet
@@ -84,6 +85,10 @@ class DrawList:
     def vertices_of(self, program: moderngl.Program) -> list[tuple]:
         """Those of `vertices` that the program reads."""
         return [part for part in self.vertices if any(name in program for name in part[2:])]
+
+    def runs(self, seen: NDArray[np.bool_]) -> tuple[NDArray, NDArray]:
+        """Of the (C,) commands that are seen, the solid ones and the thin ones."""
+        return self.table[seen & ~self.thin], self.table[seen & self.thin]
 
     @property
     def texture_groups(self) -> int:
@@ -114,6 +119,7 @@ class GpuScene:
         moved: Sequence[NDArray[np.float32]] = (),
         primvars: tuple[str, ...] = (),
         texels: Mapping[Texture, float] = NO_TEXELS,
+        thin: Sequence[int] = (),
     ) -> DrawList:
         """Make the scene's geometry, placements and materials resident, relative to its camera.
 
@@ -121,6 +127,7 @@ class GpuScene:
         moved: (V, 3) points of all meshes a frame before and after, where MOTION is among them.
         primvars: names of those that layers show, at most MOST_PRIMVARS.
         texels: a side that textures are worth; those that it does not name are read whole.
+        thin: numbers of the materials that may let something through.
         """
         layer_uv = "LAYER_UV" in inputs
         self._instances.write(instance_records(scene.drawables, scene.camera.position))
@@ -140,6 +147,7 @@ class GpuScene:
             self._pool = self._replaced(self._pool, arrays_of(scene.meshes, uvs))
         self._meshes, self._made_for = scene.meshes, made_for
         commands, rows = draw_commands(scene.drawables, scene.meshes)
+        thin_commands = np.isin(rows[commands["base_instance"], 1], thin)
         numbers = [np.arange(len(rows), dtype=np.uint32)] * ("DRAW_ROW" in inputs)
         self._draws = self._replaced(self._draws, [rows, *numbers])
         positions, normals, indices, *varying = self._pool
@@ -155,7 +163,14 @@ class GpuScene:
         corners = command_corners(scene)
         many_uvs = uv_sets > FEW_UV_SETS
         return DrawList(
-            tuple(vertices), indices, commands, corners, color_varies=color_varies, textures=textures, many_uvs=many_uvs
+            tuple(vertices),
+            indices,
+            commands,
+            thin_commands,
+            corners,
+            color_varies=color_varies,
+            textures=textures,
+            many_uvs=many_uvs,
         )
 
     def _update_materials(self, scene: Scene, slots: Mapping[str, int], texels: Mapping[Texture, float]) -> TextureSet:

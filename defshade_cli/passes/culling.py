@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,12 +28,20 @@ def may_see(clip_from_relative: NDArray[np.float32], corners: NDArray[np.float64
 
 
 class CommandBuffer:
-    """Indirect commands, written anew for every view."""
+    """Indirect commands, written anew for every view, in runs that different programs draw."""
 
     def __init__(self, gpu: Gpu) -> None:
-        self.buffer = gpu.keep(gpu.context.buffer(reserve=256))
+        self._buffer = gpu.keep(gpu.context.buffer(reserve=256))
+        self._ends = np.zeros(1, np.int64)
 
-    def write(self, commands: NDArray) -> None:
-        data = commands.tobytes()
-        self.buffer.orphan(max(len(data), self.buffer.size))
-        self.buffer.write(data)
+    def write(self, runs: Sequence[NDArray]) -> None:
+        data = np.concatenate(runs).tobytes()
+        self._ends = np.cumsum([0, *map(len, runs)])
+        self._buffer.orphan(max(len(data), self._buffer.size))
+        self._buffer.write(data)
+
+    def render(self, array: moderngl.VertexArray, run: int) -> None:
+        """Draw a run of those that were written."""
+        first, end = (int(place) for place in self._ends[run : run + 2])
+        if end > first:
+            array.render_indirect(self._buffer, count=end - first, first=first)

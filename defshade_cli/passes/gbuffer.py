@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import moderngl
 import numpy as np
@@ -89,9 +89,11 @@ class GBufferPass:
         }
         self._gpu, self._context, self._commands = gpu, gpu.context, CommandBuffer(gpu)
         self._clip_distances = range(_CLIP_DISTANCE0, _CLIP_DISTANCE0 + variant.clipping_planes)
-        self._program = gpu.shaders.program(
-            "gbuffer.vert", "gbuffer.frag", defines=variant.defines, generated=generated
-        )
+        solid = replace(variant, cutout=False, transparent=False)
+        self._programs = [
+            gpu.shaders.program("gbuffer.vert", "gbuffer.frag", defines=kind.defines, generated=generated)
+            for kind in [solid, variant][: 1 + variant.cutout]
+        ]
 
     def draw(
         self,
@@ -103,7 +105,9 @@ class GBufferPass:
         *,
         whole: bool = False,
     ) -> None:
-        """What the bound View of `camera` may see of `draws`, one multi-draw; both sides of every face.
+        """What the bound View of `camera` may see of `draws`, in a multi-draw of what is solid and one of what is not.
+
+        Both sides of every face.
 
         Under the mask the depth is the background's afterwards, and the planes are undefined unless `whole`.
         """
@@ -119,19 +123,18 @@ class GBufferPass:
         framebuffer.use()
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = "<" if standard else ">"
-        draws.textures.bind(self._program)
-        self._clip(camera)
-        vertex_array = self._context.vertex_array(self._program, draws.vertices_of(self._program), draws.indices)
-        seen = may_see(clip_from_relative, draws.corners)
-        self._commands.write(draws.table[seen])
-        if seen.any():
-            vertex_array.render_indirect(self._commands.buffer, count=int(seen.sum()))
-        vertex_array.release()
+        self._commands.write(draws.runs(may_see(clip_from_relative, draws.corners)))
+        for run, program in enumerate(self._programs):
+            draws.textures.bind(program)
+            self._clip(camera, program)
+            array = self._context.vertex_array(program, draws.vertices_of(program), draws.indices)
+            self._commands.render(array, run)
+            array.release()
         for distance in self._clip_distances:
             self._context.disable_direct(distance)
         mask.fill(gbuffer.target, background)
 
-    def _clip(self, camera: Camera) -> None:
+    def _clip(self, camera: Camera, program: moderngl.Program) -> None:
         """By the camera's clipping planes, in relative space. Shadows are cast by what they cut off, as in Storm."""
         for distance in self._clip_distances:
             self._context.enable_direct(distance)
@@ -139,4 +142,4 @@ class GBufferPass:
             planes = camera.clipping_planes.copy()
             planes[:, :3] @= camera.world_from_camera[:3, :3].T
             values = [tuple(plane) for plane in planes.tolist()]
-            self._program["clipping_planes"] = values if len(values) > 1 else values[0]
+            program["clipping_planes"] = values if len(values) > 1 else values[0]

@@ -120,12 +120,12 @@ class Pipeline:
         if "MOTION" in plan.inputs:
             self._motions.write(motion_records(scene, plan))
             moved = tuple(neighbouring_points(scene))
-        return self._scene.update(scene, plan.inputs, moved, plan.primvars, plan.texels)
+        return self._scene.update(scene, plan.inputs, moved, plan.primvars, plan.texels, plan.thin)
 
     def planes(self, scene: Scene, plan: Plan) -> Planes:
         """The float GBuffer at the pixels' centres: what the float64 reference is evaluated on."""
         self._gpu.make_current()
-        return self._drawn_planes(self._scene.update(scene, texels=plan.texels), plan.planes, plan)
+        return self._drawn_planes(self._scene.update(scene, texels=plan.texels, thin=plan.thin), plan.planes, plan)
 
     def _sampled_layers(
         self, draws: DrawList, scene: Scene, plan: Plan, moments: Iterator[ShutterSample] | None
@@ -144,7 +144,8 @@ class Pipeline:
         for sample in samples(plan.samples, plan.filter, plan.filter_width):
             if moments and plan.moments and sample.index % plan.samples_a_moment == 0:
                 scene, plan = next(moments)
-                draws, tables = self._scene.update(scene, plan.inputs, texels=plan.texels), self._tables.update(plan)
+                draws = self._scene.update(scene, plan.inputs, texels=plan.texels, thin=plan.thin)
+                tables = self._tables.update(plan)
                 mattes.see(scene)
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             if plan.mattes:

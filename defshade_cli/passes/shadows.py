@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import moderngl
 import numpy as np
@@ -173,7 +173,11 @@ class ShadowPass:
         generated = {"generated/textures.glsl": textures_source(variant.texture_groups)}
         size = (TILES * RESOLUTION, TILES * RESOLUTION)
         self._context = gpu.context
-        self._program = gpu.shaders.program("shadow.vert", "shadow.frag", defines=variant.defines, generated=generated)
+        kinds = [replace(variant, cutout=False), variant][: 1 + variant.cutout]
+        self._programs = [
+            gpu.shaders.program("shadow.vert", "shadow.frag", defines=kind.defines, generated=generated)
+            for kind in kinds
+        ]
         self._depth = gpu.keep(gpu.depth_texture(size))
         self._framebuffer = gpu.keep(gpu.context.framebuffer([], self._depth))
         self._maps = RecordBuffer(gpu, SHADOW_MAPS)
@@ -205,26 +209,25 @@ class ShadowPass:
         return ShadowAtlas(self._depth, first, count)
 
     def _draw_maps(self, draws: DrawList, maps: Sequence[Camera], records: NDArray, casters: NDArray) -> None:
-        """Each map with the commands that it may see."""
-        commands = [draws.table[may_see(m, draws.corners)] for m in records["clip_from_relative"]]
-        self._commands.write(np.concatenate(commands))
+        """Each map with the commands that it may see, those first that let nothing through."""
+        kinds = len(self._programs)
+        seen = [may_see(m, draws.corners) for m in records["clip_from_relative"]]
+        self._commands.write([run for mask in seen for run in draws.runs(mask)[:kinds]])
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = ">"
         self._context.polygon_offset = _DEPTH_OFFSET
-        array = self._context.vertex_array(self._program, draws.vertices_of(self._program), draws.indices)
-        first = 0
-        for tile, (row, seen) in enumerate(zip(records, commands, strict=True)):
-            x, y = tile % TILES, tile // TILES
-            self._framebuffer.viewport = (x * RESOLUTION, y * RESOLUTION, RESOLUTION, RESOLUTION)
-            self._program["clip_from_relative"] = tuple(row["clip_from_relative"].ravel().tolist())
-            if "towards_light" in self._program:
-                self._program["towards_light"] = _towards(maps[tile])
-            if "first_caster" in self._program:
-                self._program["first_caster"] = int(casters[tile])
-            if len(seen):
-                array.render_indirect(self._commands.buffer, count=len(seen), first=first)
-            first += len(seen)
-        array.release()
+        for kind, program in enumerate(self._programs):
+            array = self._context.vertex_array(program, draws.vertices_of(program), draws.indices)
+            for tile, row in enumerate(records):
+                x, y = tile % TILES, tile // TILES
+                self._framebuffer.viewport = (x * RESOLUTION, y * RESOLUTION, RESOLUTION, RESOLUTION)
+                program["clip_from_relative"] = tuple(row["clip_from_relative"].ravel().tolist())
+                if "towards_light" in program:
+                    program["towards_light"] = _towards(maps[tile])
+                if "first_caster" in program:
+                    program["first_caster"] = int(casters[tile])
+                self._commands.render(array, tile * kinds + kind)
+            array.release()
         self._context.polygon_offset = 0.0, 0.0
         self._maps.write(records)
 

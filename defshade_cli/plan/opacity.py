@@ -17,6 +17,12 @@ def thin_materials(scene: Scene) -> tuple[Material, ...]:
     return tuple(m for m in scene.materials if _may_be_thin(m) or (m.uses_display_opacity and shows_thin))
 
 
+def thin_numbers(scene: Scene, thin: Iterable[Material]) -> tuple[int, ...]:
+    """Numbers of those materials, and of those that show one side alone where there are any thin ones."""
+    found = {id(material) for material in thin}
+    return tuple(i for i, m in enumerate(scene.materials) if found and (id(m) in found or m.one_sided))
+
+
 def _may_be_thin(material: Material) -> bool:
     return material.opacity < 1.0 or material.opacity_threshold > 0.0 or "opacity" in material.inputs
 

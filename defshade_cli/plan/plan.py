@@ -19,7 +19,7 @@ from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.groups import light_groups, light_outputs
 from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
 from defshade_cli.plan.moments import count_moments, share_moments
-from defshade_cli.plan.opacity import is_transparent, thin_materials
+from defshade_cli.plan.opacity import is_transparent, thin_materials, thin_numbers
 from defshade_cli.plan.texels import seen_texels
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.ies import IesProfile
@@ -52,7 +52,7 @@ class Plan:
     lights: sorted quads, spheres, cones.  lighting: how they are drawn, volumes or tiles.
     shadows: some light casts them.  shadow_linked: in some light not all geometry does.
     background: domes are seen where no geometry is.
-    cutout: some opacity may be below 1.  transparent: and scales the diffuse alone.
+    thin: numbers of the materials whose opacity may be below 1.  transparent: it scales the diffuse of some alone.
     texels: of each texture that is read, a side that it is worth, see plan/texels.py.
     data_pass: data layers need an unjittered float GBuffer of their own.
     portals: how many hints for sampling domes the stage has.
@@ -84,7 +84,7 @@ class Plan:
     shadows: bool
     shadow_linked: bool
     background: bool
-    cutout: bool
+    thin: tuple[int, ...]
     transparent: bool
     texels: Mapping[Texture, float]
     data_pass: bool
@@ -110,6 +110,11 @@ class Plan:
     def textures(self) -> bool:
         """Does some material read them?"""
         return bool(self.texels)
+
+    @property
+    def cutout(self) -> bool:
+        """Is something drawn that may let through what lies behind it?"""
+        return bool(self.thin)
 
     @property
     def lit(self) -> bool:
@@ -250,7 +255,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         shadows=shadows,
         shadow_linked=shadows and scene.shadow_linked,
         background=settings.background,
-        cutout=bool(thin),
+        thin=thin_numbers(scene, thin),
         transparent=is_transparent(thin, settings.shading),
         texels=seen_texels(scene, View(display_camera, display[1])),
         data_pass=data_pass,
