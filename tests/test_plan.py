@@ -111,3 +111,10 @@ def test_opacity_decides_the_cutout() -> None:
     unbound = replace(GREY, uses_display_color=True, uses_display_opacity=True)
     see_through = replace(drawable(quad()), display_opacity=np.array([0.5], np.float32))
     assert make_plan(scene([quad()], [], [unbound], drawables=[see_through]), RenderSettings()).cutout
+
+
+@pytest.mark.parametrize(("lights", "side"), [(1, 1024), (16, 1024), (64, 512), (256, 256), (1_000, 128)])
+def test_shadow_maps_are_coarser_the_more_there_are(lights: int, side: int) -> None:
+    """Each bulb sees all around by six maps; a sample draws some 64 million texels, until maps are the coarsest."""
+    plan = make_plan(replace(SCENE, lights=(bulb(0, 0, 0.5),) * lights), RenderSettings())
+    assert plan.shadow_resolution == side

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from defshade_cli.image.environment import sky_of
 from defshade_cli.passes.sampling import Sample, samples
-from defshade_cli.passes.shadows import CAPACITY, ShadowExtent, shadow_cameras
+from defshade_cli.passes.shadow_cameras import ShadowExtent, shadow_cameras
+from defshade_cli.passes.shadows import atlas_capacity
 from defshade_cli.plan import Plan, PlannedLight
+from defshade_cli.plan.shadow_maps import DOME_DIRECTIONS
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.emission import Emitter, emitter_at, far_field, sky_emitter
 from defshade_cli.scene.light import DomeLight, RectLight
@@ -21,9 +23,6 @@ from defshade_cli.scene.mesh_light import MeshLight
 from defshade_cli.scene.radiance_map import RadianceMap
 from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import Window
-
-DOME_DIRECTIONS = 4
-"""Directions of a dome in one sample, each with a shadow map of its own."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,12 +37,13 @@ class LitSample:
 def light_batches(scene: Scene, plan: Plan, sample: Sample) -> Iterator[list[LitSample]]:
     """All of the plan's lights in order, in runs whose shadow maps fit the atlas together."""
     extent = shadow_extent(scene.bounds - plan.camera.position, plan)
+    capacity = atlas_capacity(plan.shadow_resolution)
     batch: list[LitSample] = []
     used = 0
     for number, planned in enumerate(plan.lights):
         for emitter in _emitters(number, planned, plan, sample, extent):
             lit = _lit_sample(planned, emitter, plan, extent)
-            if used + len(lit.shadow_cameras) > CAPACITY:
+            if used + len(lit.shadow_cameras) > capacity:
                 yield batch
                 batch, used = [], 0
             batch.append(lit)
@@ -89,7 +89,7 @@ def shadow_extent(bounds: NDArray[np.float64], plan: Plan) -> ShadowExtent:
     corners = np.concatenate(frustum) @ rotation.T
     low, high = np.maximum(bounds[0], corners.min(axis=0)), np.minimum(bounds[1], corners.max(axis=0))
     seen = np.stack([low, high]) if (low <= high).all() else bounds
-    return ShadowExtent(_corners(seen), _corners(bounds))
+    return ShadowExtent(_corners(seen), _corners(bounds), plan.shadow_resolution)
 
 
 def _filtered_window(plan: Plan) -> Window:

@@ -222,7 +222,7 @@ class Pipeline:
         )
         cameras = [lit.shadow_cameras for lit in batch]
         casters = [tables.links.casts.get(lit.planned.light, ALL_LINKED) for lit in batch]
-        return self._shadow_pass(variant).draw(draws, cameras, sample.texel_offset, casters)
+        return self._shadow_pass(variant).draw(draws, cameras, plan.shadow_resolution, sample.texel_offset, casters)
 
     def _data_planes(self, draws: DrawList, plan: Plan) -> Planes:
         """Planes for the data layers: the beauty's own where it drew them in float at the pixels' centres.

@@ -39,7 +39,7 @@ def explain(plan: Plan) -> Iterator[Decision]:
         yield Decision("lighting", plan.lighting, covered)
     parts = bool(plan.outputs or plan.groups)
     yield _kept("light in parts", parts, "layers show lobes, groups or shadows", "no layer shows a part of the light")
-    yield _kept("shadow maps", plan.shadows, "a light casts them", "no light casts any, or none were asked")
+    yield _explain_shadows(plan)
     yield _kept("IES profiles", bool(plan.profiles), "a light is shaped by one", "no light has one")
     yield _kept("shadow linking", plan.shadow_linked, "a light chooses its casters", "everything casts shadows")
     yield _kept("environment", bool(plan.domes), "a dome lights the scene", "no dome")
@@ -56,6 +56,13 @@ def explain(plan: Plan) -> Iterator[Decision]:
     yield _kept("error estimate", plan.tracks_error, "as asked", "nothing needs it")
     if not plan.lit:
         yield Decision("lighting", "skipped", "no layer needs it")
+
+
+def _explain_shadows(plan: Plan) -> Decision:
+    if not plan.shadows:
+        return Decision("shadow maps", "skipped", "no light casts any, or none were asked")
+    side = plan.shadow_resolution
+    return Decision("shadow maps", f"{side} x {side}", f"{plan.maps_a_sample} a sample at most")
 
 
 def _explain_subdivision(plan: Plan) -> Decision:

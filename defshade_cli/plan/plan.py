@@ -20,6 +20,7 @@ from defshade_cli.plan.groups import light_groups, light_outputs
 from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
 from defshade_cli.plan.moments import count_moments, share_moments
 from defshade_cli.plan.opacity import is_transparent, thin_materials, thin_numbers
+from defshade_cli.plan.shadow_maps import count_maps, shadow_resolution
 from defshade_cli.plan.texels import seen_texels
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.ies import IesProfile
@@ -188,6 +189,16 @@ class Plan:
         return self.shadows and any(p.light.casts_shadow and p.light.shadow != PLAIN for p in self.lights)
 
     @property
+    def shadow_resolution(self) -> int:
+        """Texels along the side of each shadow map."""
+        return shadow_resolution(self.maps_a_sample)
+
+    @property
+    def maps_a_sample(self) -> int:
+        """Shadow maps that a sample may need."""
+        return sum(map(count_maps, self.lights))
+
+    @property
     def tiled(self) -> bool:
         """Are lights binned to tiles of the image?"""
         return self.lighting == "tiles"
@@ -275,7 +286,10 @@ def plan_moments(plan: Plan, seen: Iterator[Scene], settings: RenderSettings) ->
     """What the samples see in turn: `seen` with plans that fill the same planes, of the same texels."""
     for moment in seen:
         planned = make_plan(moment, settings)
-        yield moment, replace(planned, planes=plan.planes, transparent=plan.transparent, texels=plan.texels)
+        yield (
+            moment,
+            replace(planned, planes=plan.planes, transparent=plan.transparent, texels=plan.texels),
+        )
 
 
 def _seen_lights(lights: tuple[PlannedLight, ...], layers: tuple[str, ...]) -> tuple[PlannedLight, ...]:
