@@ -2,7 +2,7 @@
 #include "generated/outputs.glsl"
 #include "generated/light_block.glsl"
 
-layout(std430, binding = 9) readonly buffer LightListBlock { uint light_lists[]; };
+layout(std430, binding = 4) readonly buffer LightListBlock { uint light_lists[]; };
 
 uniform usampler2D tile_runs;      // of each tile, the first entry in the lists and how many
 

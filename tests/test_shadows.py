@@ -62,6 +62,28 @@ def test_a_point_light_casts_the_projected_square(
     np.testing.assert_allclose(shadowed[bright], lit[bright], rtol=1e-6)
 
 
+@pytest.mark.parametrize("axis", ["x", "y"])
+@pytest.mark.parametrize("degrees", [0, 90, 180, 270, 30])
+def test_each_face_of_a_cube_casts_shadows_where_they_belong(pipeline: Pipeline, axis: str, degrees: float) -> None:
+    """A lamp before the camera, a square off its axis, a wall: the square projected, whichever way all is turned."""
+    turn = rotated(axis, degrees)
+    parts = [
+        drawable(quad(4.0), 0, where=[turn @ at(0, 0, -2)]),
+        drawable(quad(0.15), 1, where=[turn @ at(0.3, 0.1, -1)]),
+    ]
+    view = replace(camera(0.0, 0.5), world_from_camera=turn @ at(0, 0, 0.9), clipping_range=(0.01, 100.0))
+    of = scene([quad(4.0), quad(0.15)], [bulb(0, 0, 0)], [WHITE], view, parts)
+    x = (np.arange(64) + 0.5) / 64 - 0.5
+    x, y = x[None, :], -x[:, None]  # tangents of the view
+    sees_wall = np.maximum(np.abs(1.9 * x - 0.3), np.abs(1.9 * y - 0.1)) > 0.15 + 0.05
+    inside = np.maximum(np.abs(2.9 * x - 0.6), np.abs(2.9 * y - 0.2)) - 0.3
+    dark, bright = sees_wall & (inside < -0.03), sees_wall & (inside > 0.03)
+    lit, shadowed = render(pipeline, of, shadows=False), render(pipeline, of)
+    assert dark.sum() > 20
+    np.testing.assert_array_equal(shadowed[dark], 0.0)
+    np.testing.assert_allclose(shadowed[bright], lit[bright], rtol=1e-6)
+
+
 def test_a_lamp_amid_the_geometry_is_shadowed_all_around(pipeline: Pipeline) -> None:
     """Six faces: a lamp in a closed box lights every wall of it but the outermost texel, and nothing outside."""
     sides = [at(0, 0, -1), at(0, 0, 1), *(rotated(axis, angle) @ at(0, 0, 1) for axis in "xy" for angle in (90, -90))]

@@ -21,11 +21,11 @@ from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.texture import Texture
 
-VIEW, INSTANCES, MATERIALS, LIGHTS, SHADOW_MAPS, TEXTURE_INPUTS, TILES, LINKS, MOTIONS, LIGHT_LISTS = range(10)
+VIEW, INSTANCES, MATERIALS, LIGHTS, LIGHT_LISTS, TEXTURE_INPUTS, TILES, LINKS, MOTIONS = range(9)
 """Binding points of the storage buffers, as the shaders declare them."""
 
-LIGHT_BLOCK = 0
-"""Binding point of the one uniform buffer."""
+LIGHT_BLOCK, SHADOW_BLOCK = range(2)
+"""Binding points of the uniform buffers."""
 
 INDICES_IN_POOL = 2
 """Which of the vertex arrays has a row a triangle; the others have one a vertex."""

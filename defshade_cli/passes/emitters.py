@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from defshade_cli.image.environment import sky_of
 from defshade_cli.passes.sampling import Sample, samples
+from defshade_cli.passes.shadow_atlas import atlas_capacity
 from defshade_cli.passes.shadow_cameras import ShadowExtent, shadow_cameras
-from defshade_cli.passes.shadows import atlas_capacity
 from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.plan.shadow_maps import DOME_DIRECTIONS
 from defshade_cli.scene.camera import Camera

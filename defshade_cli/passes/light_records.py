@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.gpu.records import record
 from defshade_cli.passes.linking import ALL_LINKED
-from defshade_cli.passes.shadows import ShadowAtlas
+from defshade_cli.passes.shadow_atlas import ShadowAtlas
 from defshade_cli.passes.tables import NO_TABLES, LightTables
 from defshade_cli.plan import PlannedLight
 from defshade_cli.scene.emission import Emitter
@@ -57,7 +57,8 @@ def light_records(
     _set_shadow(records, PLAIN)
     _set_styles(records, [planned.light for planned in lights], tables.profiles)
     if shadows:
-        records["first_shadow"], records["shadow_count"] = shadows.first, shadows.count
+        records["first_shadow"], records["first_shadow_map"] = shadows.first, shadows.first_record
+        records["shadow_count"] = shadows.count
     return records
 
 

@@ -25,7 +25,7 @@ from defshade_cli.passes.light_lists import TILE, LightBounds, list_lights, tile
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.lighting import LightingVariant
 from defshade_cli.passes.screen import Screen, regions_of
-from defshade_cli.passes.shadows import ShadowAtlas
+from defshade_cli.passes.shadow_atlas import ShadowAtlas, kind_of, shadow_source
 from defshade_cli.passes.tables import NO_TABLES, LightTables
 from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.settings import Layout
@@ -65,16 +65,20 @@ class LightTiles:
         shadows: ShadowAtlas | None = None,
         tables: LightTables = NO_TABLES,
     ) -> None:
-        """All `lights` on top of what the targets hold. Shaped ones are apart: their shader costs twice as much."""
+        """All `lights` on top of what the targets hold; those whose shaders cost more, for shape or shadows, apart."""
         self._context.enable_only(moderngl.BLEND)
         self._context.blend_func = moderngl.ONE, moderngl.ONE
-        maps = shadows.depth if shadows else None
-        kinds = [(planned.groups, planned.light.shaping is not None) for planned in lights]
+        maps = shadows.count.tolist() if shadows else [0] * len(lights)
+        kinds = [
+            (planned.groups, planned.light.shaping is not None, kind_of(count))
+            for planned, count in zip(lights, maps, strict=True)
+        ]
         for kind in dict.fromkeys(kinds):
             members = np.array([number for number, other in enumerate(kinds) if other == kind])
-            array = self._array(LightingVariant.of(self._plan, [lights[number] for number in members]))
+            array = self._array(LightingVariant.of(self._plan, [lights[number] for number in members], kind[2]))
             targets.of(kind[0]).use()
-            gbuffer.bind(array.program, tile_runs=self._runs, shadow_atlas=maps, ies_tables=tables.candela)
+            atlas = shadows.bind(array.program) if shadows else None
+            gbuffer.bind(array.program, tile_runs=self._runs, shadow_atlas=atlas, ies_tables=tables.candela)
             for first in range(0, len(members), self._most):
                 self._draw(array, records[members[first : first + self._most]])
 
@@ -116,6 +120,7 @@ def _compile(gpu: Gpu, variant: LightingVariant, most: int) -> moderngl.Program:
         "generated/planes.glsl": read_source(variant.planes, variant.layout),
         "generated/outputs.glsl": outputs_source(variant.outputs, variant.groups),
         "generated/light_block.glsl": block_source("Light", most, LIGHT_BLOCK),
+        **shadow_source(variant.shadows),
     }
     far = "quad" in variant.volumes
     distances = ["VOLUME_QUAD" if variant.volumes == ("quad",) else "VOLUMES_MIXED"] * far

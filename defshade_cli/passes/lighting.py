@@ -20,7 +20,7 @@ from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.screen import Screen
-from defshade_cli.passes.shadows import ShadowAtlas
+from defshade_cli.passes.shadow_atlas import ShadowAtlas, ShadowKind, shadow_source
 from defshade_cli.passes.tables import NO_TABLES, LightTables
 from defshade_cli.passes.volumes import cone_volume, sphere_volume
 from defshade_cli.plan import Plan, PlannedLight, Volume
@@ -41,7 +41,7 @@ class LightingVariant:
     layout: Layout
     shading: Shading
     orthographic: bool
-    shadows: bool
+    shadows: tuple[ShadowKind, ...]
     shadow_styles: bool
     ies: bool
     responses: bool
@@ -55,8 +55,13 @@ class LightingVariant:
     space: RenderSpace = REC709
 
     @classmethod
-    def of(cls, plan: Plan, chosen: Sequence[PlannedLight] | None = None) -> LightingVariant:
-        """For some of the plan's lights, or for all."""
+    def of(
+        cls,
+        plan: Plan,
+        chosen: Sequence[PlannedLight] | None = None,
+        shadows: tuple[ShadowKind, ...] = ("map", "cube"),
+    ) -> LightingVariant:
+        """For some of the plan's lights with some kinds of shadows, or for all."""
         chosen = plan.lights if chosen is None else chosen
         orthographic = plan.camera.projection == "orthographic"
         lights = [planned.light for planned in chosen]
@@ -66,7 +71,7 @@ class LightingVariant:
             plan.layout,
             plan.shading,
             orthographic,
-            plan.shadows,
+            shadows if plan.shadows else (),
             plan.shadow_styles,
             any(light.shaping and light.shaping.ies for light in lights),
             any((light.diffuse, light.specular) != (1.0, 1.0) for light in lights),
@@ -84,7 +89,8 @@ class LightingVariant:
     def defines(self) -> list[str]:
         flags = ["CLASSIC"] * (self.shading == "classic") + ["ORTHOGRAPHIC"] * self.orthographic
         flags += (
-            ["SHADOWS"] * self.shadows
+            ["SHADOWS"] * bool(self.shadows)
+            + [f"SHADOW_{kind.upper()}S" for kind in self.shadows]
             + ["SHADOW_STYLES"] * self.shadow_styles
             + ["IES"] * self.ies
             + ["RESPONSES"] * self.responses
@@ -105,6 +111,7 @@ class LightingPass:
         generated = {
             "generated/planes.glsl": read_source(variant.planes, variant.layout),
             "generated/outputs.glsl": outputs_source(variant.outputs, variant.groups),
+            **shadow_source(variant.shadows),
         }
         self._volumes: dict[Volume, moderngl.VertexArray] = {}
         for volume in variant.volumes:
@@ -129,7 +136,7 @@ class LightingPass:
         alike = [(planned.volume, planned.groups) for planned in lights]
         for volume, groups in dict.fromkeys(alike):
             targets.of(groups).use()
-            maps = shadows.depth if shadows else None
+            maps = shadows.bind(self._volumes[volume].program) if shadows else None
             gbuffer.bind(self._volumes[volume].program, shadow_atlas=maps, ies_tables=tables.candela)
             draw = self._draw_quads if volume == "quad" else self._draw_volumes
             draw(self._volumes[volume], alike.index((volume, groups)), alike.count((volume, groups)))

@@ -29,7 +29,8 @@ from defshade_cli.passes.motion import motion_records, neighbouring_points
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
 from defshade_cli.passes.screen import WHOLE, Screen, TileMask
-from defshade_cli.passes.shadows import ShadowAtlas, ShadowPass, ShadowVariant
+from defshade_cli.passes.shadow_atlas import ShadowAtlas
+from defshade_cli.passes.shadows import ShadowPass, ShadowVariant
 from defshade_cli.passes.sky_visibility import SkyVisibility, SkyVisibilityPass
 from defshade_cli.passes.stopping import Stopping
 from defshade_cli.passes.tables import LightTables, TableStore

@@ -20,8 +20,7 @@ from defshade_cli.spaces import Matrix, Window, frame_along, transform_points
 _WIDEST_DEGREES = 60.0
 _NO_WINDOW: Window = (-1.0, 1.0, -1.0, 1.0)
 _NEAREST = 1e-4  # near plane over far plane, where nothing else bounds it
-_FACES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], np.float64)
-_FACE_FRAMES = tuple(frame_along(-face) for face in _FACES)
+CUBE_FACES = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,6 +95,18 @@ def _cube(position: NDArray[np.float64], far: float, margin: float) -> tuple[Cam
     side = 1.0 + margin  # so that the faces still meet
     window = (-side, side, -side, side)
     return tuple(_framed(position, frame, window, (_NEAREST * far, far)) for frame in _FACE_FRAMES)
+
+
+def _face_frame(axis: int, sign: float) -> NDArray[np.float64]:
+    """(3, 3) of the camera that looks along an axis: right, up and back; the other two axes are its sides.
+
+    shaders/lib/shadow.glsl finds a direction's place in a face by the same rule.
+    """
+    unit = np.eye(3)
+    return np.column_stack([-sign * unit[(axis + 1) % 3], unit[(axis + 2) % 3], -sign * unit[axis]])
+
+
+_FACE_FRAMES = tuple(_face_frame(axis, sign) for axis in range(3) for sign in (1.0, -1.0))
 
 
 def _opening(camera: Camera) -> float:

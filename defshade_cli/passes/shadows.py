@@ -13,35 +13,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.records import record
 from defshade_cli.gpu.render_space import space_defines
-from defshade_cli.gpu.residence import SHADOW_MAPS, DrawList, RecordBuffer
+from defshade_cli.gpu.residence import SHADOW_BLOCK, DrawList, RecordBuffer
 from defshade_cli.gpu.textures import textures_source
 from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.culling import CommandBuffer, may_see
-from defshade_cli.passes.view import clip_from_camera, depth_coefficients
+from defshade_cli.passes.shadow_atlas import (
+    ATLAS,
+    ShadowAtlas,
+    atlas_capacity,
+    clip_from_relative,
+    cube_uniforms,
+    map_records,
+    placed,
+    viewport,
+)
+from defshade_cli.passes.shadow_cameras import CUBE_FACES
 from defshade_cli.scene.camera import Camera
-
-ATLAS = 4096
-"""Texels along a side of the atlas."""
 
 _DEPTH_OFFSET = (-2.0, -1.0)
 """Of what a map stores, in slopes a texel and in steps of depth: at the four texels around a receiver a flat surface is
 up to |∂z/∂x| + |∂z/∂y| nearer. An offset along the light moves no shadow's edge, as one of the receiver would."""
-
-
-def atlas_capacity(resolution: int) -> int:
-    """Maps that one atlas holds."""
-    return (ATLAS // resolution) ** 2
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ShadowAtlas:
-    """The maps of some lights. first, count: (L,) of each light, in the order they were given."""
-
-    depth: moderngl.Texture
-    first: NDArray[np.uint32]
-    count: NDArray[np.uint32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +68,7 @@ class ShadowPass:
         ]
         self._depth = gpu.keep(gpu.depth_texture((ATLAS, ATLAS)))
         self._framebuffer = gpu.keep(gpu.context.framebuffer([], self._depth))
-        self._maps = RecordBuffer(gpu, SHADOW_MAPS)
+        self._records = RecordBuffer(gpu, SHADOW_BLOCK, uniform=True)
         self._commands = CommandBuffer(gpu)
 
     def draw(
@@ -92,66 +84,45 @@ class ShadowPass:
         resolution: texels along a map's side.  jitter: in texels.
         casters: of each light, the place of its casters' link bits; all cast where none are given.
         """
-        count = np.array([len(c) for c in cameras], np.uint32)
+        count = np.array([len(light) for light in cameras], np.uint32)
         first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.uint32)
-        maps = [camera for light in cameras for camera in light]
+        maps = placed(cameras, resolution, jitter)
         assert len(maps) <= atlas_capacity(resolution)
         self._framebuffer.use()
         if maps:
             columns = min(len(maps), ATLAS // resolution)
             rows = -(-len(maps) // columns)
             self._framebuffer.clear(depth=0.0, viewport=(0, 0, columns * resolution, rows * resolution))
-            records = np.zeros(len(maps), record("ShadowMap"))
-            for tile, camera in enumerate(maps):
-                records[tile] = _map_record(camera, tile, resolution, jitter)
-            self._draw_maps(draws, maps, records, np.repeat(casters, count) if len(casters) else np.array([]))
-        return ShadowAtlas(self._depth, first, count)
+            self._draw_maps(draws, maps, resolution, np.repeat(casters, count) if len(casters) else np.array([]))
+        self._records.write(map_records(maps, first[count == 1], resolution))
+        cubes = first[count == CUBE_FACES]
+        uniforms = cube_uniforms(maps[cubes[0]], resolution) if len(cubes) else {}
+        first_record = (np.cumsum(count == 1) - 1).astype(np.uint32)
+        return ShadowAtlas(self._depth, first, count, first_record, uniforms)
 
-    def _draw_maps(self, draws: DrawList, maps: Sequence[Camera], records: NDArray, casters: NDArray) -> None:
+    def _draw_maps(self, draws: DrawList, maps: Sequence[Camera], resolution: int, casters: NDArray) -> None:
         """Each map with the commands that it may see, those first that let nothing through."""
         kinds = len(self._programs)
-        seen = [may_see(m, draws.corners) for m in records["clip_from_relative"]]
-        self._commands.write([run for mask in seen for run in draws.runs(mask)[:kinds]])
+        clips = [clip_from_relative(camera).T.astype(np.float32) for camera in maps]
+        self._commands.write([run for clip in clips for run in draws.runs(may_see(clip, draws.corners))[:kinds]])
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = ">"
         self._context.polygon_offset = _DEPTH_OFFSET
         for kind, program in enumerate(self._programs):
             array = self._context.vertex_array(program, draws.vertices_of(program), draws.indices)
-            for tile, row in enumerate(records):
-                self._framebuffer.viewport = _viewport(tile, row["resolution"])
-                program["clip_from_relative"] = tuple(row["clip_from_relative"].ravel().tolist())
+            for slot, clip in enumerate(clips):
+                self._framebuffer.viewport = viewport(slot, resolution)
+                program["clip_from_relative"] = tuple(clip.ravel().tolist())
                 if "towards_light" in program:
-                    program["towards_light"] = _towards(maps[tile])
+                    program["towards_light"] = _towards(maps[slot])
                 if "first_caster" in program:
-                    program["first_caster"] = int(casters[tile])
-                self._commands.render(array, tile * kinds + kind)
+                    program["first_caster"] = int(casters[slot])
+                self._commands.render(array, slot * kinds + kind)
             array.release()
         self._context.polygon_offset = 0.0, 0.0
-        self._maps.write(records)
 
 
 def _towards(camera: Camera) -> tuple[float, ...]:
     """The light of a map: (position, 1), or (direction, 0) of one that is far away."""
     distant = camera.projection == "orthographic"
     return (*camera.world_from_camera[:3, 2 if distant else 3].tolist(), 0.0 if distant else 1.0)
-
-
-def _viewport(tile: int, resolution: int) -> tuple[int, int, int, int]:
-    """Of a tile of the atlas, row by row; in texels."""
-    row, column = divmod(tile, ATLAS // resolution)
-    return column * resolution, row * resolution, resolution, resolution
-
-
-def _map_record(camera: Camera, tile: int, resolution: int, jitter: tuple[float, float]) -> NDArray:
-    """The ShadowMap of a tile, its camera's window moved by `jitter`."""
-    left, right, bottom, top = camera.window
-    texel = ((right - left) / resolution, (top - bottom) / resolution)
-    dx, dy = jitter[0] * texel[0], jitter[1] * texel[1]
-    window = left + dx, right + dx, bottom + dy, top + dy
-    clip_from_light = clip_from_camera(camera, window, camera.clipping_range, standard=False)
-    row = np.zeros((), record("ShadowMap"))
-    row["clip_from_relative"] = (clip_from_light @ camera.camera_from_world).T
-    row["tile"] = np.array(_viewport(tile, resolution)) / ATLAS
-    row["texel"], row["resolution"] = max(texel), resolution
-    row["depth_coefficients"] = depth_coefficients(camera, camera.clipping_range, standard=False)
-    return row

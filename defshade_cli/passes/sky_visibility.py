@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import moderngl
 
@@ -14,7 +14,7 @@ from defshade_cli.passes.frame import Frame, Size
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.lighting import LightingVariant
 from defshade_cli.passes.screen import Screen
-from defshade_cli.passes.shadows import ShadowAtlas
+from defshade_cli.passes.shadow_atlas import ShadowAtlas, shadow_source
 from defshade_cli.plan import Plan, PlannedLight
 
 
@@ -44,7 +44,9 @@ class SkyVisibilityPass:
 
     def __init__(self, gpu: Gpu, variant: LightingVariant, screen: Screen) -> None:
         self._context, self._screen = gpu.context, screen
+        variant = replace(variant, shadows=("map",))
         generated = {"generated/planes.glsl": read_source(variant.planes, variant.layout)}
+        generated |= shadow_source(variant.shadows)
         files = ("light_quad.vert", "sky_visibility.frag")
         program = gpu.shaders.program(*files, defines=[*variant.defines, "VOLUME_QUAD"], generated=generated)
         self._array = screen.array(program)

@@ -80,7 +80,8 @@ struct Light {
     vec3 focus_tint;
     uint profile;
     vec2 response;             // multipliers of the diffuse and of the specular lobe
-    uint first_shadow;         // shadow map, the first of six for a light that sees all around
+    uint first_shadow;         // of its maps in the atlas, if they are six faces of a cube
+    uint first_shadow_map;     // its ShadowMap, if it has a single one
     uint shadow_count;         // 0: casts none
     uint is_sky;               // one of the few directions that stand for a dome
     float extent;              // area that the point stands for; a distant light's solid angle; 0 for a point
@@ -97,9 +98,11 @@ struct Light {
 };
 
 struct ShadowMap {
-    mat4 clip_from_relative;
-    vec4 tile;                 // place in the atlas: offset and size, texture coordinates
-    float texel;               // width of a texel one unit ahead; of every texel for a distant light
-    float resolution;          // texels a side
+    vec4 x;                    // rows that take a relative position to a texel of the atlas and to what it stores, over w
+    vec4 y;
+    vec4 z;
+    vec4 w;
+    vec2 least;                // texel where it begins
+    float side;                // texels
     vec2 depth_coefficients;   // depth z: 1 / z, or z for a distant light, = x * stored + y
 };

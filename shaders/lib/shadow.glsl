@@ -1,27 +1,78 @@
 #include "lib/records.glsl"
 
 #ifdef SHADOWS
-layout(std430, binding = 4) readonly buffer ShadowBlock { ShadowMap shadow_maps[]; };
+#include "generated/shadow_maps.glsl"
+
 uniform sampler2D shadow_atlas;
 
-// The six maps of a light that sees all around, in the order +X −X +Y −Y +Z −Z.
-uint cube_face(vec3 direction) {
-    vec3 a = abs(direction);
-    if (a.x >= a.y && a.x >= a.z) return direction.x >= 0.0 ? 0u : 1u;
-    if (a.y >= a.z) return direction.y >= 0.0 ? 2u : 3u;
-    return direction.z >= 0.0 ? 4u : 5u;
+// Receivers count as nearer to the light by a share of a texel, which clears float32 rounding; the records hold it. The maps'
+// own depth offset keeps surfaces from shadowing themselves.
+struct ShadowTexel {
+    vec2 place;                // in the atlas, in texels
+    vec2 least;                // where its map begins
+    float side;                // of its map, in texels
+    float depth;               // of the receiver, as maps store it
+    vec2 depth_coefficients;   // see ShadowMap
+};
+
+#ifdef SHADOW_CUBES
+uniform vec4 cube_window;      // in a face at u and v one unit ahead: texel = cube_window.xy * (u, v) + cube_window.zw
+uniform vec2 cube_depth;       // stored = cube_depth.x / depth + cube_depth.y
+uniform vec2 cube_coefficients;
+uniform ivec2 atlas_grid;      // of maps in a row of the atlas, and of texels along a map's side, the binary logarithms
+
+// In a light's six faces, +X -X +Y -Y +Z -Z: a face along an axis has the next two for its sides.
+ShadowTexel in_cube(Light light, vec3 position) {
+    vec3 away = position - light.position;
+    vec3 size = abs(away);
+    bool x = size.x >= size.y && size.x >= size.z, y = !x && size.y >= size.z;
+    vec3 sides = x ? away.yzx : y ? away.zxy : away;
+    float depth = abs(sides.z);
+    int slot = int(light.first_shadow) + (x ? 0 : y ? 2 : 4) + int(sides.z < 0.0);
+    ShadowTexel at;
+    at.side = float(1 << atlas_grid.y);
+    at.least = vec2(ivec2(slot & (1 << atlas_grid.x) - 1, slot >> atlas_grid.x) << atlas_grid.y);
+    vec2 across = vec2(sides.z < 0.0 ? sides.x : -sides.x, sides.y) / depth;
+    at.place = at.least + cube_window.xy * across + cube_window.zw;
+    at.depth = cube_depth.x / depth + cube_depth.y;
+    at.depth_coefficients = cube_coefficients;
+    return at;
+}
+#endif
+
+#ifdef SHADOW_MAPS
+ShadowTexel in_map(Light light, vec3 position) {
+    ShadowMap map = shadowmap_at(light.first_shadow_map);
+    vec4 relative = vec4(position, 1.0);
+    float w = dot(map.w, relative);
+    ShadowTexel at;
+    at.side = map.side;
+    at.least = map.least;
+    at.place = vec2(dot(map.x, relative), dot(map.y, relative)) / w;
+    at.depth = dot(map.z, relative) / w;
+    at.depth_coefficients = map.depth_coefficients;
+    return at;
+}
+#endif
+
+ShadowTexel shadow_texel(Light light, vec3 position) {
+#if defined(SHADOW_MAPS) && defined(SHADOW_CUBES)
+    if (light.shadow_count == 6u) return in_cube(light, position);
+    return in_map(light, position);
+#elif defined(SHADOW_CUBES)
+    return in_cube(light, position);
+#else
+    return in_map(light, position);
+#endif
 }
 
-// Towards the light, in texels: clears float32 rounding. The maps' own depth offset keeps surfaces from shadowing themselves.
-const float LIGHT_OFFSET = 0.02;
-
 #ifdef SHADOW_STYLES
-// UsdLuxShadowAPI: how much of each texel's shadow is left at a receiver of depth `receiver` in the map. What the map
-// knows is the occluder nearest to the light.
-vec4 shadow_strength(Light light, ShadowMap map, vec4 stored, float receiver, vec3 position) {
+// UsdLuxShadowAPI: how much of each texel's shadow is left at the receiver. What the map knows is the occluder nearest to
+// the light.
+vec4 shadow_strength(Light light, ShadowTexel at, vec4 stored, vec3 position) {
     if (light.shadow_distance < 0.0) return vec4(1.0);
-    vec4 occluders = map.depth_coefficients.x * stored + map.depth_coefficients.y;
-    float own = map.depth_coefficients.x * receiver + map.depth_coefficients.y;
+    vec4 occluders = at.depth_coefficients.x * stored + at.depth_coefficients.y;
+    float own = at.depth_coefficients.x * at.depth + at.depth_coefficients.y;
     vec4 apart = own - occluders;
     if (!is_distant(light)) apart = length(light.position - position) * (1.0 - own / occluders);
     vec4 left = light.shadow_distance - apart;
@@ -31,26 +82,21 @@ vec4 shadow_strength(Light light, ShadowMap map, vec4 stored, float receiver, ve
 #endif
 
 // Share of the light that reaches a relative position: the four nearest texels, bilinearly.
-float visibility(Light light, vec3 position, vec3 l) {
+float visibility(Light light, vec3 position) {
     if (light.shadow_count == 0u) return 1.0;
-    uint face = light.shadow_count == 6u ? cube_face(-l) : 0u;
-    ShadowMap map = shadow_maps[light.first_shadow + face];
-    float texel = map.texel * (map.clip_from_relative * vec4(position, 1.0)).w; // in scene units at the receiver
-    vec4 clip = map.clip_from_relative * vec4(position + texel * LIGHT_OFFSET * l, 1.0);
-    vec3 ndc = clip.xyz / clip.w;
-    vec2 within = (0.5 + 0.5 * vec2(ndc.x, -ndc.y)) * map.resolution;
-    within = clamp(within, 0.5, map.resolution - 0.5);
-    vec4 stored = textureGather(shadow_atlas, map.tile.xy + within / map.resolution * map.tile.zw, 0);
-    vec4 lit = vec4(lessThanEqual(stored, vec4(ndc.z)));
+    ShadowTexel at = shadow_texel(light, position);
+    vec2 place = clamp(at.place, at.least + 0.5, at.least + at.side - 0.5);
+    vec4 stored = textureGather(shadow_atlas, place / ATLAS, 0);
+    vec4 lit = vec4(lessThanEqual(stored, vec4(at.depth)));
 #ifdef SHADOW_STYLES
-    lit = 1.0 - (1.0 - lit) * shadow_strength(light, map, stored, ndc.z, position);
+    lit = 1.0 - (1.0 - lit) * shadow_strength(light, at, stored, position);
 #endif
-    vec2 t = fract(within - 0.5);
+    vec2 t = fract(place - 0.5);
     vec2 row = mix(lit.wx, lit.zy, t.x);
     return mix(row.x, row.y, t.y);
 }
 #else
-float visibility(Light light, vec3 position, vec3 l) {
+float visibility(Light light, vec3 position) {
     return 1.0;
 }
 #endif
