@@ -9,7 +9,8 @@
 #   make bench   measure whole processes, ours and peers' in PEERS_PYTHON, into docs/performance.md
 #   make accuracy  measure accumulated light against Mitsuba 3, into docs/accuracy.md
 #   make error-check  compare the errors that renders claim with those that they have, into docs/accuracy.md
-#   make fuzz    render mutated stages and images in contained processes: 10,000, or COUNT=N, from SEED=N
+#   make fuzz    render mutated stages and images in contained processes: 10,000, or COUNT=N, from SEED=N,
+#                FIRST=N on, for SECONDS_AT_MOST=N
 #   make kill-check  kill renders at 200 random moments
 #   make stress  render the corners of the arithmetic, into docs/stability.md
 #   make conformance  lay stages by others beside their references, into build/conformance and docs/conformance.md
@@ -74,8 +75,10 @@ error-check: .venv/.ready-reference
 
 COUNT ?= 10000
 SEED ?= 1
+FIRST ?= 0
+SECONDS_AT_MOST ?=
 fuzz: .venv/.ready
-	$(BIN)/python -m defshade_cli.measure.fuzz $(COUNT) $(SEED)
+	$(BIN)/python -m defshade_cli.measure.fuzz $(COUNT) $(SEED) $(FIRST) $(SECONDS_AT_MOST)
 
 kill-check: .venv/.ready-dev
 	DEFSHADE_KILLS=200 $(BIN)/pytest -q tests/test_faults.py -k killed

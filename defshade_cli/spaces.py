@@ -98,9 +98,9 @@ def frame_along(direction: NDArray) -> NDArray[np.float64]:
 
 
 def _unit(x: float, y: float, z: float) -> Triple | None:
-    """None for a zero vector."""
-    length = math.sqrt(x * x + y * y + z * z)
-    return (x / length, y / length, z / length) if length > 0.0 else None
+    """None for a zero vector, and for one that is not finite."""
+    length = math.hypot(x, y, z)
+    return (x / length, y / length, z / length) if 0.0 < length < math.inf else None
 
 
 def _cross(a: Triple, b: Triple) -> Triple:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import resource
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +13,8 @@ INTERVAL = 0.2
 """Seconds between two looks at workers that have a limit."""
 
 _MIB = 1 << 20
+_FOR_THE_DRIVER = 256 * _MIB
+"""Stacks of its threads, and code that it compiles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +34,16 @@ class Limits:
         if self.memory is not None and _resident(process) > self.memory * _MIB:
             return f"it took more than {self.memory} MiB of memory"
         return ""
+
+
+def build_wall(memory: int) -> None:
+    """Let this process fail to allocate what would take it well past `memory` MiB, which comes too fast to be watched.
+
+    What libraries and the driver map, touched or not, is let through: setrlimit(2), RLIMIT_DATA.
+    """
+    mapped = int(re.search(r"VmData:\s*(\d+) kB", Path("/proc/self/status").read_text())[1]) * 1024  # type: ignore[index]
+    wall = max(memory * _MIB, mapped) + _FOR_THE_DRIVER
+    resource.setrlimit(resource.RLIMIT_DATA, (wall, resource.getrlimit(resource.RLIMIT_DATA)[1]))
 
 
 def _resident(process: int) -> int:

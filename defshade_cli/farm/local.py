@@ -54,7 +54,7 @@ class LocalEngine:
         self._limits = limits
         self._limit = workers
         self._threads = threads or max(1, core_count() // workers)
-        self._arguments = (command, log_level)
+        self._arguments = (command, log_level, str(limits.memory or 0))
         self._queue: deque[Chunk] = deque()
         self._workers: list[_Worker] = []
 

@@ -12,6 +12,7 @@ from defshade_cli.image.layers.variables import layer_of
 from defshade_cli.scene.framing import THREE_QUARTER, Framing
 from defshade_cli.scene.product import Product
 from defshade_cli.settings import RenderJob, RenderSettings
+from defshade_cli.usd.blame import blaming
 from defshade_cli.usd.products import lost_products, read_products
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.saved_settings import read_own_settings
@@ -28,20 +29,21 @@ class OpenJob:
 
     def __init__(self, job: RenderJob) -> None:
         self._stage = open_stage(job.stage, job.composition, job.camera)
-        self._job = with_own_settings(job, read_own_settings(self._stage, job.render_settings))
         self._readers: dict[str, StageReader] = {}
         self._fingerprints: dict[str, Fingerprint] = {}
-        self.frames: tuple[float | None, ...] = job.frames or (first_frame(self._stage),)
-        self._tell_what_is_lost()
+        with blaming(self._stage):
+            self._job = with_own_settings(job, read_own_settings(self._stage, job.render_settings))
+            self.frames: tuple[float | None, ...] = job.frames or (first_frame(self._stage),)
+            self._tell_what_is_lost()
 
     def shots(self, frame: float | None) -> list[Shot]:
         """The images of a frame. Raises StageError, UsageError."""
-        products = self._products(frame)
+        with blaming(self._stage):
+            products = self._products(frame)
+            names = [self.reader(product).camera_name for product in products]
         several = len(products) > 1
-        return [
-            make_shot(self._job, frame, product, self.reader(product).camera_name, several=several)
-            for product in products
-        ]
+        named = zip(products, names, strict=True)
+        return [make_shot(self._job, frame, product, name, several=several) for product, name in named]
 
     def reader(self, product: Product) -> StageReader:
         """Reads the stage as the product is seen. Raises StageError."""

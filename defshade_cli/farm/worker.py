@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from multiprocessing.connection import Connection
 
 from defshade_cli.errors import DefshadeError, GpuError
+from defshade_cli.farm.limits import build_wall
 from defshade_cli.farm.tasks import Chunk, Outcome, failed, joined
 from defshade_cli.rendering import Renderer, run
 
@@ -41,12 +42,17 @@ def render_chunk(chunk: Chunk, renderer: Renderer, command: str) -> Iterator[Out
             yield failed(pending.pop(0), str(error), error.exit_code)
             if isinstance(error, GpuError):
                 renderer.close()
+        except MemoryError:
+            yield failed(pending.pop(0), "there is not as much memory as it takes")
+            renderer.close()
 
 
 def main() -> None:
-    descriptor, command, level = sys.argv[1:]
+    descriptor, command, level, memory = sys.argv[1:]
     logging.basicConfig(format="defshade: %(message)s", level=logging.WARNING)
     logging.getLogger("defshade").setLevel(level)
+    if int(memory):
+        build_wall(int(memory))
     serve(Connection(int(descriptor)), command)
 
 

@@ -89,7 +89,7 @@ class Angles:
 
 def alpha_from_roughness(roughness: Array) -> Array:
     """GGX alpha = roughness², as UsdPreviewSurface's schema suggests."""
-    return np.maximum(np.square(roughness), MIN_ALPHA)
+    return np.clip(np.square(roughness), MIN_ALPHA, 1.0)
 
 
 def D_GGX(alpha: Array, noh: Array) -> Array:

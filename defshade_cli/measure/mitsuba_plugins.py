@@ -20,7 +20,7 @@ mi.set_variant("llvm_ad_rgb")
 
 
 def _alpha(roughness: float) -> float:
-    return max(roughness * roughness, MIN_ALPHA)
+    return min(max(roughness * roughness, MIN_ALPHA), 1.0)
 
 
 def _lobe(alpha: float, nov: Any, nol: Any, h: Any) -> Any:

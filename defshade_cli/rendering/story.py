@@ -147,19 +147,22 @@ def _written_behind(frames: Iterator[_DrawnFrame]) -> Generator[FrameResult, Non
     """Each frame once it is written, which happens while the next is drawn; also if drawing that one fails."""
     waiting: Future[FrameResult] | None = None
     failure: DefshadeError | None = None
-    with ThreadPoolExecutor(1, "writer") as writer:
-        while failure is None:
-            try:
-                drawn = next(frames, None)
-            except DefshadeError as error:
-                drawn, failure = None, error
-            if waiting:
-                yield waiting.result()
-            if drawn is None:
-                break
-            waiting = writer.submit(drawn.written)
-    if failure:
-        raise failure
+    try:
+        with ThreadPoolExecutor(1, "writer") as writer:
+            while failure is None:
+                try:
+                    drawn = next(frames, None)
+                except DefshadeError as error:
+                    drawn, failure = None, error
+                if waiting:
+                    yield waiting.result()
+                if drawn is None:
+                    break
+                waiting = writer.submit(drawn.written)
+        if failure:
+            raise failure
+    finally:
+        waiting = failure = None  # an error that the frame of its own traceback holds would keep the stage open
 
 
 def _draw(shot: Shot, opened: OpenJob, renderer: Renderer, command: str, stills: Stills) -> _Drawn | ImageResult:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pxr import Sdf, Tf, Usd
 
-from defshade_cli.errors import StageNotFound
+from defshade_cli.errors import StageError, StageNotFound
 from defshade_cli.settings import Composition
 from defshade_cli.usd.diagnostics import commentary
 from defshade_cli.usd.mask import add_what_is_referred_to, limited_to
@@ -16,10 +16,17 @@ from defshade_cli.usd.variants import choose_variant
 def compose(path: Path, composition: Composition, camera: str | None) -> Usd.Stage:
     """The stage of the file at `path`. camera: as the user names it; it is there whatever the mask.
 
-    Raises StageNotFound for a file that is missing or is not USD, PrimNotFound for a prim, variant set or variant that
-    the stage lacks.
+    Raises StageNotFound for a file that is missing or is not USD, StageError for layers that cannot be composed,
+    PrimNotFound for a prim, variant set or variant that the stage lacks.
     """
     root, session = read_layer(path), _session(composition.session_layers)
+    try:
+        return _composed(root, session, composition, camera)
+    except Tf.ErrorException as error:
+        raise StageError(f"{path} cannot be composed: {_first_line(error)}") from None
+
+
+def _composed(root: Sdf.Layer, session: Sdf.Layer, composition: Composition, camera: str | None) -> Usd.Stage:
     load = Usd.Stage.LoadNone if composition.payloads == "none" else Usd.Stage.LoadAll
     if composition.mask:
         stage = Usd.Stage.OpenMasked(root, session, limited_to(composition.mask, camera), load)

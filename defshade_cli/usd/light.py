@@ -27,11 +27,12 @@ from defshade_cli.scene.light import (
 )
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.scene.shadow import ShadowStyle
+from defshade_cli.usd.blame import mistyped
 from defshade_cli.usd.color_space import in_rec709
 from defshade_cli.usd.dome import is_dome, pole, sky_texture
 from defshade_cli.usd.light_files import with_files
 from defshade_cli.usd.mesh_light import Glow, is_mesh_light, read_glow
-from defshade_cli.usd.values import is_finite
+from defshade_cli.usd.values import is_finite, resembles
 
 CAMERA_LIGHT = "<camera light>"
 """Path of the light of a stage that has none."""
@@ -154,10 +155,15 @@ def _left_out(prim: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
     authored = [attr for attr in prim.GetAuthoredAttributes() if attr.GetName().startswith(_INPUTS)]
     if odd := [attr.GetName() for attr in authored if not is_finite(attr.Get(time))]:
         yield f"not finite, so the schema's own values count: {', '.join(odd)}"
+    yield from mistyped(prim)
 
 
 def _input(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Any:
-    """Value of `inputs:name`, or the schema's fallback, also for what is not finite; None where the schema has none."""
+    """Value of `inputs:name`, or the schema's fallback, also for what is not finite or of another type.
+
+    None where the schema has none.
+    """
     attribute = prim.GetAttribute(_INPUTS + name)
     value = attribute.Get(time) if attribute else None
-    return value if is_finite(value) else prim.GetPrimDefinition().GetAttributeFallbackValue(_INPUTS + name)
+    fallback = prim.GetPrimDefinition().GetAttributeFallbackValue(_INPUTS + name)
+    return value if is_finite(value) and (fallback is None or resembles(value, fallback)) else fallback

@@ -46,6 +46,9 @@ _FIELDS = {
 _WITHOUT_EFFECT = ("occlusion",)
 """Inputs that direct light does not see: occlusion dims what comes from all around. Only a layer shows it."""
 
+_SHARES = ("metallic", "roughness", "clearcoat", "clearcoat_roughness", "opacity")
+"""Fields from 0 to 1. Roughness beyond is that of no surface, and its lobe's normalization overflows."""
+
 _DEFAULTS = {f.name: f.default for f in fields(Material)}
 _CHANNELS = {"r": slice(0, 1), "g": slice(1, 2), "b": slice(2, 3), "a": slice(3, 4)}
 _READER = "UsdPrimvarReader_"
@@ -84,7 +87,7 @@ def read_material(
     """
     prim = UsdShade.Material(stage.GetPrimAtPath(path))
     if not prim:
-        return _not_understood(shown_as, "the bound material does not exist")
+        return not_understood(shown_as, "the bound material does not exist")
     network = Network(time)
     shader, identifier = _surface_of(prim)
     if identifier == _PREVIEW_SURFACE:
@@ -96,7 +99,7 @@ def read_material(
         reason, left_out = f"lost of {identifier}", list(translation.lost)
         material = Material(shown_as, **_sound(translation.values, left_out), inputs=translation.textures)
     else:
-        return _not_understood(shown_as, _surface_named(prim, shader, identifier))
+        return not_understood(shown_as, _surface_named(prim, shader, identifier))
     left_out.extend(f"textures at primvar {name}" for name in material.uv_names[UV_SETS:])
     issues = (Unsupported(shown_as, f"{reason}: {', '.join(left_out)}"),) if left_out else ()
     return ReadMaterial(material, time_varying=network.time_varying, issues=issues)
@@ -112,7 +115,8 @@ def _surface_of(material: UsdShade.Material) -> tuple[UsdShade.Shader, str]:
     return sources[0], str(sources[0].GetShaderId() or "") if sources[0] else ""
 
 
-def _not_understood(path: str, reason: str) -> ReadMaterial:
+def not_understood(path: str, reason: str) -> ReadMaterial:
+    """A material that is drawn like an unbound one."""
     material = replace(UNBOUND, path=path)
     return ReadMaterial(material, understood=False, issues=(Unsupported(path, reason),))
 
@@ -183,7 +187,12 @@ def _sound(values: Mapping[str, Any], left_out: list[str]) -> dict[str, Any]:
     if values.get("ior", 0.0) < 0.0:
         left_out.append("ior (below 0)")
         odd.append("ior")
-    return {name: value for name, value in values.items() if name not in odd}
+    sound = {name: value for name, value in values.items() if name not in odd}
+    for name in (name for name in _SHARES if name in sound):
+        value, sound[name] = sound[name], min(max(sound[name], 0.0), 1.0)
+        if value != sound[name]:
+            left_out.append(f"{name} ({value:g} counts as {sound[name]:g})")
+    return sound
 
 
 def _fallback(network: Network, node: UsdShade.Shader, channel: str) -> Any:

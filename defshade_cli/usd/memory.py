@@ -10,9 +10,10 @@ from pxr import Sdf, Usd, UsdGeom
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.usd import draw_mode
 from defshade_cli.usd.binding import NOTHING_ABOVE, Bindings, Bound, read_bound
+from defshade_cli.usd.blame import blamed
 from defshade_cli.usd.geometry import Surface, is_time_varying, move_surface, only_points_vary, read_surface
 from defshade_cli.usd.kind import Kinds
-from defshade_cli.usd.material import ReadMaterial, read_material
+from defshade_cli.usd.material import ReadMaterial, not_understood, read_material
 from defshade_cli.usd.positions import is_carried_by_velocities
 from defshade_cli.usd.primvars import DISPLAY_COLOR
 from defshade_cli.usd.said import Said
@@ -102,13 +103,19 @@ class Memory:
     def material(self, path: Sdf.Path, time: Usd.TimeCode) -> ReadMaterial:
         if path in self._materials:
             return self._materials[path]
-        if path.IsPropertyPath():
-            read = draw_mode.read_material(self._stage, path, self.shown(path))
-        else:
-            read = read_material(self._stage, path, self.shown(path), time, occlusion=self._extras.occlusion)
+        try:
+            read = self._read_material(path, time)
+        except Exception as error:  # a bug goes on as one
+            reason = blamed(error, self._stage.GetPrimAtPath(path.GetPrimPath()))
+            read = not_understood(self.shown(path), reason)
         if not read.time_varying:
             self._materials[path] = read
         return read
+
+    def _read_material(self, path: Sdf.Path, time: Usd.TimeCode) -> ReadMaterial:
+        if path.IsPropertyPath():
+            return draw_mode.read_material(self._stage, path, self.shown(path))
+        return read_material(self._stage, path, self.shown(path), time, occlusion=self._extras.occlusion)
 
     def bindings(self, path: Sdf.Path | str) -> Bindings:
         """Relationships do not vary over time."""

@@ -25,6 +25,7 @@ from defshade_cli.scene.view import View
 from defshade_cli.settings import Complexity
 from defshade_cli.spaces import Window, conform_window
 from defshade_cli.usd import stage as facts
+from defshade_cli.usd.blame import blaming
 from defshade_cli.usd.camera import choose_camera, default_window, find_cameras, framed_camera, read_camera
 from defshade_cli.usd.complexity import UNIFORM_LEVELS, choose_levels
 from defshade_cli.usd.drawables import Glowing, drawables_of
@@ -44,7 +45,7 @@ from defshade_cli.usd.settings import read_settings
 from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.tessellation import Tessellation
 from defshade_cli.usd.traversal import Traversal
-from defshade_cli.usd.unresolved import find_unresolved
+from defshade_cli.usd.unresolved import by_reason, find_unresolved
 
 log = logging.getLogger("defshade")
 
@@ -91,7 +92,8 @@ class StageReader:
         self._lights: dict[str, Light] = {}
         self._pass = read_pass(stage, render_settings)
         self._cameras = find_cameras(stage)
-        unresolved = (arc.unsupported for arc in find_unresolved(stage))
+        unresolved = tuple(arc.unsupported for arc in find_unresolved(stage))
+        self._told = set(unresolved)  # by open_stage
         self._issues = (*unresolved, *pass_issues(stage, render_settings))
         self._camera = None if framing else choose_camera(stage, self._cameras, camera, self._settings.camera)
 
@@ -115,12 +117,13 @@ class StageReader:
         if self._still:
             return replace(self._still, frame=frame)
         time = Usd.TimeCode.Default() if frame is None else Usd.TimeCode(frame)
-        with facts.gathered_diagnostics():
+        with facts.gathered_diagnostics(), blaming(self._stage):
             levels = self._levels = {}
             scene = self._read(frame, time, levels)
             if self._extras.motion and frame is not None:
                 neighbours = tuple(self._moment(scene, frame + step, levels) for step in (-1.0, 1.0))
                 scene = replace(scene, neighbours=neighbours)
+        self._tell(scene.unsupported)
         scene = self._lit(scene)
         self._still = scene if self.is_still else None
         return scene
@@ -133,8 +136,15 @@ class StageReader:
         assert scene.frame is not None
         for offset in cycle(scene.camera.shutter_times(count)):
             time = Usd.TimeCode(scene.frame + offset)
-            with facts.silence():
-                yield self._lit(self._read(scene.frame, time, self._levels))
+            with facts.silence(), blaming(self._stage):
+                moment = self._read(scene.frame, time, self._levels)
+            yield self._lit(moment)
+
+    def _tell(self, issues: Iterable[Unsupported]) -> None:
+        """Log what the picture lacks, or shows otherwise than authored, when it is first met."""
+        if new := [issue for issue in issues if issue not in self._told]:
+            log.warning("not as authored: %s", by_reason(new))
+            self._told.update(new)
 
     def _moment(self, scene: Scene, frame: float, levels: dict[str, int]) -> Moment:
         """What `scene` has, as it is at another frame, refined alike."""

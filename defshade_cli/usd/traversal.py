@@ -14,6 +14,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdLux
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.binding import Bindings, bound_to
+from defshade_cli.usd.blame import blamed
 from defshade_cli.usd.copies import Copies, once
 from defshade_cli.usd.draw_mode import FULL, handed_down, mode_above, takes_effect
 from defshade_cli.usd.geometry import Surface, is_time_varying
@@ -77,29 +78,41 @@ class Traversal:
         stack = [(root, above) for root in reversed(list(roots))]
         while stack:
             prim, above = stack.pop()
-            nature = self._memory.kinds.of(prim)
-            kind = nature.kind
-            if kind is Kind.SHADING or self._is_pruned(prim):
+            try:
+                children, here = self._visit(prim, above, predicate, pieces, instances)
+            except Exception as error:  # a bug goes on as one
+                self._report(prim, blamed(error, prim))
                 continue
-            said = said_of(prim, primvars_above=above.primvars)
-            here = self._stand(prim, above, nature, said)
-            if here is None:
-                continue
-            if here.draw_mode not in (None, FULL) and takes_effect(prim):
-                pieces.append(self._stand_in(prim, here))
-                continue
-            pieces.extend(self._own_pieces(prim, kind, here, said))
-            if self._is_hidden(prim) and (kind is Kind.POINT_INSTANCER or prim.IsInstance()):
-                continue
-            if kind is Kind.POINT_INSTANCER:
-                pieces.extend(self._point_instances(prim, here))
-            elif prim.IsInstance() and not _is_rigged_from_above(prim, here):
-                instances.add(prim, here)
-            else:
-                chosen = Usd.TraverseInstanceProxies(predicate) if here.rig else predicate
-                stack.extend((child, here) for child in reversed(prim.GetFilteredChildren(chosen)))
+            stack.extend((child, here) for child in reversed(children))
         pieces.extend(self._native_instances(instances))
         return tuple(pieces)
+
+    def _visit(
+        self, prim: Usd.Prim, above: Standing, predicate: object, pieces: list[Piece], instances: NativeInstances
+    ) -> tuple[Sequence[Usd.Prim], Standing]:
+        """Put the prim with `pieces` or `instances`. Returns the children to visit, and what they stand in."""
+        nature = self._memory.kinds.of(prim)
+        kind = nature.kind
+        if kind is Kind.SHADING or self._is_pruned(prim):
+            return (), above
+        said = said_of(prim, primvars_above=above.primvars)
+        here = self._stand(prim, above, nature, said)
+        if here is None:
+            return (), above
+        if here.draw_mode not in (None, FULL) and takes_effect(prim):
+            pieces.append(self._stand_in(prim, here))
+            return (), here
+        pieces.extend(self._own_pieces(prim, kind, here, said))
+        if self._is_hidden(prim) and (kind is Kind.POINT_INSTANCER or prim.IsInstance()):
+            return (), here
+        if kind is Kind.POINT_INSTANCER:
+            pieces.extend(self._point_instances(prim, here))
+            return (), here
+        if prim.IsInstance() and not _is_rigged_from_above(prim, here):
+            instances.add(prim, here)
+            return (), here
+        chosen = Usd.TraverseInstanceProxies(predicate) if here.rig else predicate
+        return prim.GetFilteredChildren(chosen), here
 
     def _stand(self, prim: Usd.Prim, above: Standing, nature: Nature, said: Said) -> Standing | None:
         """What `prim` hands down, None where it is invisible; of other than Imageables only the draw mode counts."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from pxr import Usd
@@ -34,11 +34,16 @@ def find_unresolved(stage: Usd.Stage) -> tuple[Unresolved, ...]:
 
 def summary(unresolved: Sequence[Unresolved]) -> str:
     """All of them in one line, those that lack the same together."""
+    return f"the stage is incomplete: {by_reason(arc.unsupported for arc in unresolved)}"
+
+
+def by_reason(issues: Iterable[Unsupported]) -> str:
+    """In one line, the prims of one reason together."""
     prims = defaultdict(list)
-    for arc in unresolved:
-        prims[arc.reason].append(arc.prim)
+    for issue in issues:
+        prims[issue.reason].append(issue.path)
     parts = [f"{reason} ({paths[0]}{_more(len(paths) - 1)})" for reason, paths in list(prims.items())[:_MOST_NAMED]]
-    return f"the stage is incomplete: {'; '.join(parts)}{_more(len(prims) - _MOST_NAMED)}"
+    return f"{'; '.join(parts)}{_more(len(prims) - _MOST_NAMED)}"
 
 
 def _reason(text: str) -> str:

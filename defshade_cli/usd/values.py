@@ -38,3 +38,11 @@ def integers(value: object) -> NDArray[np.integer] | None:
     """(N,) integers; None for anything else."""
     array = np.asarray(value)
     return array if array.dtype.kind in "iu" and array.ndim == 1 else None
+
+
+def resembles(value: object, model: object) -> bool:
+    """Is `value` of the kind that `model` is: as many numbers, or the same type?"""
+    array, like = np.asarray(value), np.asarray(model)
+    if like.dtype.kind in "biuf":
+        return array.dtype.kind in "biuf" and array.shape == like.shape
+    return type(value) is type(model)

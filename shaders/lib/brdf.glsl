@@ -1,7 +1,7 @@
 #include "lib/constants.glsl"
 
 float GGX_alpha(float roughness) {
-    return max(roughness * roughness, MIN_ALPHA);
+    return clamp(roughness * roughness, MIN_ALPHA, 1.0);
 }
 
 // Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces".

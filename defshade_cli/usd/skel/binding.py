@@ -71,5 +71,6 @@ class Rigs:
         if not skinning or not (skinning.HasJointInfluences() or skinning.HasBlendShapes()):
             return None
         skeleton = UsdSkel.BindingAPI(prim).GetInheritedSkeleton()
-        query = self._cache.GetSkelQuery(skeleton) if skeleton else UsdSkel.SkeletonQuery()
-        return Deformer(skinning, query, skeleton.GetPrim())
+        if not skeleton:
+            return None
+        return Deformer(skinning, self._cache.GetSkelQuery(skeleton), skeleton.GetPrim())

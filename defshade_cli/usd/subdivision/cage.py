@@ -89,7 +89,7 @@ class Cage:
     def twin(self) -> Indices:
         """(H,) the half-edge that runs the other way along the same edge; −1 on boundary and non-manifold edges."""
         half_edges = np.arange(len(self.origin), dtype=np.int32)
-        first, last = np.empty((2, self.edge_count), np.int32)
+        first, last = np.zeros((2, self.edge_count), np.int32)  # below an edge from a vertex to itself, one has no face
         first[self.edge[::-1]] = half_edges[::-1]
         last[self.edge] = half_edges
         opposed = (self.origin[first] != self.origin[last]) & (self.face[first] != self.face[last])
