@@ -37,12 +37,12 @@ class Limits:
 
 
 def build_wall(memory: int) -> None:
-    """Let this process fail to allocate what would take it well past `memory` MiB, which comes too fast to be watched.
+    """Let this process fail to allocate what would take it past `memory` MiB, which comes too fast to be watched.
 
-    What libraries and the driver map, touched or not, is let through: setrlimit(2), RLIMIT_DATA.
+    A process that has as much already is left to the watch: setrlimit(2), RLIMIT_DATA.
     """
     mapped = int(re.search(r"VmData:\s*(\d+) kB", Path("/proc/self/status").read_text())[1]) * 1024  # type: ignore[index]
-    wall = max(memory * _MIB, mapped) + _FOR_THE_DRIVER
+    wall = max(memory * _MIB, mapped + _FOR_THE_DRIVER)
     resource.setrlimit(resource.RLIMIT_DATA, (wall, resource.getrlimit(resource.RLIMIT_DATA)[1]))
 
 

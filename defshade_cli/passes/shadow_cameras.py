@@ -20,6 +20,7 @@ from defshade_cli.spaces import Matrix, Window, frame_along, transform_points
 _WIDEST_DEGREES = 60.0
 _NO_WINDOW: Window = (-1.0, 1.0, -1.0, 1.0)
 _NEAREST = 1e-4  # near plane over far plane, where nothing else bounds it
+_LEAST = 1e-20  # where what is lit lies at the light itself, to float64's digits
 CUBE_FACES = 6
 
 
@@ -47,7 +48,7 @@ def shadow_cameras(
     """The maps' cameras: one, or the six of a cube in the shader's order; the emitter is relative to the eye."""
     if distant:
         return (_parallel(emitter.axis, extent),)
-    far = float(np.linalg.norm(extent.receivers - emitter.position, axis=1).max()) * 1.001
+    far = float(np.linalg.norm(extent.receivers - emitter.position, axis=1).max()) * 1.001 + _LEAST
     fitted = [_around_cone(emitter, shaping, far, extent.margin), _around_receivers(emitter.position, extent, far)]
     cameras = [camera for camera in fitted if camera is not None]
     return (min(cameras, key=_opening),) if cameras else _cube(emitter.position, far, extent.margin)
@@ -58,7 +59,7 @@ def _parallel(axis: NDArray[np.float64], extent: ShadowExtent) -> Camera:
     camera_from_world = _looking(centre, axis, _NO_WINDOW, (0, 0)).camera_from_world
     seen = transform_points(camera_from_world, extent.receivers)
     depth = -transform_points(camera_from_world, np.concatenate([extent.receivers, extent.casters]))[:, 2]
-    margin = extent.margin * float(np.ptp(seen, axis=0).max()) + 1e-12
+    margin = extent.margin * float(np.ptp(seen, axis=0).max()) + 1e-12 * max(1.0, float(np.abs(depth).max()))
     low, high = seen.min(axis=0) - margin, seen.max(axis=0) + margin
     clip = (depth.min() - margin, depth.max() + margin)
     return _looking(centre, axis, (low[0], high[0], low[1], high[1]), clip, "orthographic")

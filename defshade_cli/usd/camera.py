@@ -18,7 +18,7 @@ from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.framing import world_from_front
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.spaces import Window, rigid, translation
-from defshade_cli.usd.values import is_finite
+from defshade_cli.usd.values import STANDS_NOWHERE, is_finite, within_reach
 from defshade_cli.usd.xform import matrix
 
 log = logging.getLogger("defshade")
@@ -68,8 +68,8 @@ def read_camera(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Camera, tuple[Unsup
     schema, path = UsdGeom.Camera(prim), str(prim.GetPath())
     gf = schema.GetCamera(time)
     is_perspective = gf.projection == Gf.Camera.Perspective
-    if not is_finite(gf.transform):
-        raise StageError(f"camera {path} stands nowhere: its transform is not finite")
+    if not within_reach(matrix(gf.transform)).all():
+        raise StageError(f"camera {path} stands nowhere: {STANDS_NOWHERE}")
     planes, issues = _clipping_planes(gf, path)
     lens = {
         "exposure": schema.ComputeLinearExposureScale(time),

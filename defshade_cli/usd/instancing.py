@@ -23,6 +23,7 @@ from defshade_cli.usd.binding import NOTHING_BOUND, Bindings
 from defshade_cli.usd.geometry import Surface
 from defshade_cli.usd.primvars import read_display
 from defshade_cli.usd.skel import Rig
+from defshade_cli.usd.values import within_reach
 from defshade_cli.usd.xform import IDENTITY
 
 
@@ -120,9 +121,9 @@ def place(pieces: Iterable[Piece], placement: Placement) -> Iterator[Piece]:
 
 def finite(pieces: Sequence[Piece]) -> tuple[tuple[Piece, ...], tuple[str, ...]]:
     """The pieces where their transforms put them, and the paths of those that stand nowhere."""
-    if not pieces or np.isfinite(np.concatenate([piece.root_from_object for piece in pieces])).all():
+    if not pieces or within_reach(np.concatenate([piece.root_from_object for piece in pieces])).all():
         return tuple(pieces), ()
-    masks: list[NDArray[np.bool_]] = [np.all(np.isfinite(piece.root_from_object), axis=(1, 2)) for piece in pieces]
+    masks: list[NDArray[np.bool_]] = [np.all(within_reach(piece.root_from_object), axis=(1, 2)) for piece in pieces]
     kept = [some(piece, mask) if not mask.all() else piece for piece, mask in zip(pieces, masks, strict=True)]
     lost = (path for piece, mask in zip(pieces, masks, strict=True) for path in _paths_where(piece, ~mask))
     return tuple(piece for piece in kept if len(piece.ids)), tuple(dict.fromkeys(lost))

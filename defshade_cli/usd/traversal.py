@@ -28,6 +28,7 @@ from defshade_cli.usd.point_instancer import has_varying_copies, read_point_inst
 from defshade_cli.usd.render_pass import PassRules
 from defshade_cli.usd.said import Said, said_of
 from defshade_cli.usd.skel import Rig
+from defshade_cli.usd.values import STANDS_NOWHERE
 from defshade_cli.usd.xform import gf_matrix, matrix
 
 _VISIBILITY, _PURPOSE = str(UsdGeom.Tokens.visibility), str(UsdGeom.Tokens.purpose)
@@ -66,7 +67,7 @@ class Traversal:
 
     def read_stage(self) -> tuple[Piece, ...]:
         pieces, lost = finite(self._read(self._stage.GetPseudoRoot().GetChildren(), Standing(draw_mode=FULL)))
-        self.issues.update(dict.fromkeys(Unsupported(path, "its transform is not finite") for path in lost))
+        self.issues.update(dict.fromkeys(Unsupported(path, STANDS_NOWHERE) for path in lost))
         return pieces
 
     def _read(

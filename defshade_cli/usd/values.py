@@ -22,6 +22,17 @@ def floats(value: object, width: int) -> NDArray[np.float32] | None:
         return array.astype(np.float32, copy=False)
 
 
+FARTHEST = 1e18
+"""Where a scene ends: the squares of its lengths are numbers of float32 still."""
+
+STANDS_NOWHERE = f"its transform is not finite, or goes beyond {FARTHEST:g}"
+
+
+def within_reach(numbers: NDArray) -> NDArray[np.bool_]:
+    """Which are finite, and no greater than FARTHEST."""
+    return np.abs(numbers) <= FARTHEST
+
+
 def is_finite(value: object) -> bool:
     """No number in `value` is infinite or NaN; what holds no numbers is finite too."""
     array = np.asarray(value)
