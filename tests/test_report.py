@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import html
 import json
-import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
 
+from browser import needs_browser, told_by
 from defshade_cli.farm.report import write_report
 from defshade_cli.farm.tasks import Chunk, Outcome
 from defshade_cli.image.files import write
 from defshade_cli.settings import OutputSettings, RenderJob
 from films import film
-
-BROWSER = next((path for name in ("chromium", "google-chrome") if (path := shutil.which(name))), None)
-QUIET = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run")
 
 
 def written_report(folder: Path, frames: int) -> Path:
@@ -65,7 +60,7 @@ def test_an_unreadable_image_is_told(tmp_path: Path) -> None:
     assert "cannot be read" in (tmp_path / "r.html").read_text()
 
 
-DRIVE = """<script>
+DRIVE = """
   const failed = document.querySelector("figure.failed"), log = failed.querySelector("pre");
   const last = [...document.querySelectorAll("figure.fine img.shown")].at(-1);
   const low = () => Math.round(last.getBoundingClientRect().top);
@@ -82,21 +77,14 @@ DRIVE = """<script>
   told.log = [seen(log), log.textContent];
   document.getElementById("troubles").click();
   told.troubles = frames();
-  document.title = JSON.stringify(told);
-</script>"""
+  tell(told);
+"""
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium")
+@needs_browser
 def test_the_page_in_a_browser(tmp_path: Path) -> None:
     """Scroll to the end, switch to a layer, open the log of the frame that failed, keep only troubles."""
-    report = written_report(tmp_path, frames=40)
-    driven = tmp_path / "driven.html"
-    driven.write_text(report.read_text().replace("</html>", DRIVE + "</html>"))
-    profile = f"--user-data-dir={tmp_path / 'profile'}"
-    command = [str(BROWSER), *QUIET, profile, "--window-size=800,600", "--dump-dom", driven.as_uri()]
-    shown = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
-    title = html.unescape(shown.partition("<title>")[2].partition("</title>")[0])
-    assert json.loads(title) == {
+    assert told_by(written_report(tmp_path, frames=40), DRIVE) == {
         "before": [["beauty"], 41, False, True],
         "scrolled": [True, True, True],
         "header": 0,

@@ -8,12 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from numpy.typing import NDArray
 
 from defshade_cli.cli import defshade
 from defshade_cli.image.colour import display_transform
 from defshade_cli.image.false_colour import colors_of_ids
 from defshade_cli.image.files import targets, write
+from defshade_cli.image.film import Film
 from defshade_cli.image.layers import LAYERS
+from defshade_cli.image.look import look_at_film
 from defshade_cli.image.reading import read, read_header
 from defshade_cli.image.sheet import TILE, contact_sheet
 from defshade_cli.settings import OutputSettings
@@ -22,24 +25,28 @@ from films import film
 SHEET = OutputSettings(sheet=True)
 
 
+def sheet_of(film: Film, *names: str) -> NDArray[np.float32]:
+    return contact_sheet({name: look_at_film(film, name, display_transform()) for name in names})
+
+
 def test_every_layer_of_the_table_has_a_tile() -> None:
     """As wide as the film, over its strip; nothing is not a number, whatever the layers hold."""
     everything = film(size=(64, 36))
-    sheet = contact_sheet(everything, tuple(LAYERS), display_transform())
+    sheet = sheet_of(everything, *LAYERS)
     assert np.isfinite(sheet).all() and sheet.min() >= 0.0 and sheet.max() <= 1.0
     columns = (sheet.shape[1] - 8) // (64 + 8)
     assert sheet.shape[0] == 8 + -(-len(LAYERS) // columns) * (36 + 44 + 8)
 
 
 def test_large_films_become_tiles() -> None:
-    sheet = contact_sheet(film("beauty", size=(1000, 500)), ("beauty",), display_transform())
+    sheet = sheet_of(film("beauty", size=(1000, 500)), "beauty")
     assert sheet.shape == (TILE // 2 + 44 + 16, TILE + 16, 3)
 
 
 def test_near_is_bright_and_what_is_endless_is_black() -> None:
     depth = np.full((20, 300, 1), np.inf, np.float32)
     depth[:, :100], depth[:, 100:200] = 1.0, 5.0
-    sheet = contact_sheet(replace(film("depth"), layers={"depth": depth}), ("depth",), display_transform())
+    sheet = sheet_of(replace(film("depth"), layers={"depth": depth}), "depth")
     near, far, endless = (sheet[18, 8 + x].sum() for x in (50, 150, 250))
     assert near > far > endless == 0.0
 
@@ -47,7 +54,7 @@ def test_near_is_bright_and_what_is_endless_is_black() -> None:
 def test_ids_have_the_colours_that_their_legend_shows() -> None:
     ids = np.full((20, 300, 1), 7.0, np.float32)
     source = replace(film("primId"), layers={"primId": ids}, manifests={"primId": {7: "/World/Chair"}})
-    sheet = contact_sheet(source, ("primId",), display_transform())
+    sheet = sheet_of(source, "primId")
     color = colors_of_ids(np.array([7], np.uint32))[0]
     assert sheet[18, 100] == pytest.approx(color)
     assert (np.abs(sheet[28:] - color).max(axis=-1) < 1e-6).sum() == 16 * 18

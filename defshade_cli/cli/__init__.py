@@ -1,9 +1,9 @@
 """The command line: the only package that speaks click and rich.
 
     options    what commands share, and the RenderJob it becomes
-    render gbuffer batch inspect bench compare doctor    one command each
+    render gbuffer batch inspect bench compare view doctor    one command each
     progress   the ways of telling how far a job is    stats    the record that --stats writes
-    jobfile tally table    what batch reads, counts and shows
+    jobfile tally table    what batch reads, counts and shows    terminal    what view asks the terminal
     reference  docs/commands.md, from the commands themselves
 
 A command builds a job, calls one function and prints: results to stdout; progress, logs and errors to stderr.
@@ -24,6 +24,7 @@ from defshade_cli.cli.doctor import doctor
 from defshade_cli.cli.gbuffer import gbuffer
 from defshade_cli.cli.inspect import inspect
 from defshade_cli.cli.render import render
+from defshade_cli.cli.view import view
 from defshade_cli.errors import DefshadeError, UsageError
 
 INTERRUPTED = 130  # 128 + SIGINT, as shells have it
@@ -47,7 +48,7 @@ def defshade(context: click.Context) -> None:
         context.exit(UsageError.exit_code)
 
 
-for command in (render, gbuffer, batch, inspect, bench, compare, doctor):
+for command in (render, gbuffer, batch, inspect, bench, compare, view, doctor):
     defshade.add_command(command)
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import html
 import json
-import os
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any
 
 from defshade_cli.errors import OutputError
 from defshade_cli.farm.tasks import Outcome
+from defshade_cli.image.page import filled, place
 from defshade_cli.image.reading import read_header
 from defshade_cli.image.thumbnail import thumbnails
 
@@ -28,16 +28,14 @@ def write_report(outcomes: Sequence[Outcome], seconds: float, path: Path) -> Non
     frames = [_frame(outcome) for outcome in sorted(outcomes, key=_order)]
     record = {"seconds": round(seconds, 3), "frames": [{k: v for k, v in f.items() if k != "images"} for f in frames]}
     layers = dict.fromkeys(layer for frame in frames for layer in frame["images"])
-    parts = {
-        "{{summary}}": html.escape(_summary(frames, seconds)),
-        "{{layers}}": "".join(_button(layer) for layer in layers),
-        "{{stages}}": "".join(_stages(frames)),
-    }
-    page = _TEMPLATE.read_text(encoding="utf-8")
-    for place, text in parts.items():
-        page = page.replace(place, text)
-    _place(path, page)
-    _place(path.with_suffix(".json"), json.dumps(record, indent=2) + "\n")
+    page = filled(
+        _TEMPLATE,
+        summary=html.escape(_summary(frames, seconds)),
+        layers="".join(_button(layer) for layer in layers),
+        stages="".join(_stages(frames)),
+    )
+    place(path, page)
+    place(path.with_suffix(".json"), json.dumps(record, indent=2) + "\n")
 
 
 def _order(outcome: Outcome) -> tuple[str, float]:
@@ -105,16 +103,3 @@ def _log(said: str, log: str) -> str:
 
 def _button(layer: str) -> str:
     return f'<button data-layer="{html.escape(layer)}">{html.escape(layer)}</button>'
-
-
-def _place(path: Path, text: str) -> None:
-    """A file that appears whole."""
-    hidden = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        hidden.write_text(text, encoding="utf-8")
-        hidden.replace(path)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror}") from error
-    finally:
-        hidden.unlink(missing_ok=True)

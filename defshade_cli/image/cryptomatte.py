@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,13 @@ def cryptomatte_header(layer: str, names: Mapping[int, str]) -> dict[str, str]:
         f"{prefix}/conversion": "uint32_to_float32",
         f"{prefix}/manifest": json.dumps(manifest, ensure_ascii=False, separators=(",", ":")),
     }
+
+
+def read_manifests(header: Mapping[str, Any]) -> dict[str, dict[int, str]]:
+    """Of a file's attributes: the layers' names as they have them → names by the bits of their ids."""
+    keys = [key.rpartition("/")[0] for key in header if key.startswith("cryptomatte/") and key.endswith("/name")]
+    manifests = {header[f"{key}/name"]: json.loads(header.get(f"{key}/manifest", "{}")) for key in keys}
+    return {layer: {int(bits, 16): name for name, bits in names.items()} for layer, names in manifests.items()}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -23,9 +23,9 @@ def read(path: Path, *, data_window: bool = False) -> dict[str, Pixels]:
     A cropped data window is filled up with zeros, unless the `data_window` alone is wanted. Raises OutputError.
     """
     layers: dict[str, Pixels] = {}
-    for spec, stored in _parts(path):
-        pixels = stored if data_window else _uncropped(spec, stored)
-        for name, channels in _grouped(spec).items():
+    for spec, stored in parts(path):
+        pixels = stored if data_window else uncropped(spec, stored)
+        for name, channels in grouped(spec).items():
             layers.setdefault(name, np.take(pixels, channels, axis=-1))
     return layers
 
@@ -45,7 +45,8 @@ def _open(path: Path) -> oiio.ImageInput:
     return source
 
 
-def _parts(path: Path) -> Iterator[tuple[oiio.ImageSpec, NDArray]]:
+def parts(path: Path) -> Iterator[tuple[oiio.ImageSpec, NDArray]]:
+    """Every part's header and its pixels (H, W, C) float32, of its data window. Raises OutputError."""
     source = _open(path)
     part = 0
     while source.seek_subimage(part, 0):
@@ -57,7 +58,8 @@ def _parts(path: Path) -> Iterator[tuple[oiio.ImageSpec, NDArray]]:
         part += 1
 
 
-def _uncropped(spec: oiio.ImageSpec, pixels: NDArray) -> NDArray:
+def uncropped(spec: oiio.ImageSpec, pixels: NDArray) -> NDArray:
+    """The pixels of a data window in the display window of its header, zeros around them."""
     whole = (spec.full_height, spec.full_width)
     top, left = spec.y - spec.full_y, spec.x - spec.full_x
     if (top, left) == (0, 0) and pixels.shape[:2] == whole:
@@ -69,7 +71,7 @@ def _uncropped(spec: oiio.ImageSpec, pixels: NDArray) -> NDArray:
     return canvas
 
 
-def _grouped(spec: oiio.ImageSpec) -> dict[str, list[int]]:
+def grouped(spec: oiio.ImageSpec) -> dict[str, list[int]]:
     """Layer → indices of its channels."""
     part = spec.get_string_attribute("oiio:subimagename")
     part = BEAUTY if part == MAIN_PART else part

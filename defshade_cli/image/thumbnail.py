@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import base64
-import tempfile
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO as oiio
 
 from defshade_cli.image.colour import Pixels, display_transform, picture
 from defshade_cli.image.encoders import EXR, suffix_of
+from defshade_cli.image.inline import jpeg_address
 from defshade_cli.image.layers import BEAUTY, LAYERS
 from defshade_cli.image.reading import read
 
@@ -21,22 +19,13 @@ def thumbnails(path: Path) -> dict[str, str]:
     """Layer → a picture as a `data:` address; layers without a look of their own are left out. Raises OutputError."""
     layers = read(path)
     if suffix_of(path) != EXR:
-        return {BEAUTY: _address(_reduced(layers[BEAUTY]))}
+        return {BEAUTY: jpeg_address(_reduced(layers[BEAUTY]))}
     transform = display_transform()
     shown = {name: _reduced(pixels) for name, pixels in layers.items() if name in LAYERS}
-    return {name: _address(picture(LAYERS[name], pixels, transform, alpha=False)) for name, pixels in shown.items()}
+    return {name: jpeg_address(picture(LAYERS[name], pixels, transform, alpha=False)) for name, pixels in shown.items()}
 
 
 def _reduced(pixels: Pixels) -> Pixels:
     """Every n-th pixel: no mean of depths, and quick."""
     step = max(1, -(-pixels.shape[1] // _WIDTH))
     return np.ascontiguousarray(pixels[::step, ::step])
-
-
-def _address(pixels: Pixels) -> str:
-    channels = 3 if pixels.shape[2] >= 3 else 1
-    with tempfile.NamedTemporaryFile(suffix=".jpg") as file:
-        buffer = oiio.ImageBuf(np.ascontiguousarray(pixels[..., :channels]))
-        buffer.specmod().attribute("compression", "jpeg:85")
-        buffer.write(file.name, "uint8")
-        return "data:image/jpeg;base64," + base64.b64encode(Path(file.name).read_bytes()).decode()

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from defshade_cli.image.colour import Pixels, display_transform, picture
 from defshade_cli.image.encoders.sink import bounded, make_spec, opened, set_attributes
 from defshade_cli.image.film import Film
+from defshade_cli.image.look import look_at_film
 from defshade_cli.image.metadata import text_attributes
 from defshade_cli.image.sheet import contact_sheet
 from defshade_cli.settings import OutputSettings
@@ -77,7 +78,7 @@ def write_picture(film: Film, name: str, output: OutputSettings, path: Path) -> 
 def write_sheet(film: Film, names: tuple[str, ...], output: OutputSettings, path: Path) -> None:
     """Write all the layers as tiles of one picture. Raises OSError with the reason."""
     transform = display_transform(output.display, output.view, output.look, film.render_space)
-    sheet = contact_sheet(film, names, transform)
+    sheet = contact_sheet({name: look_at_film(film, name, transform) for name in names})
     height, width = sheet.shape[:2]
     _write(sheet, oiio.ImageSpec(width, height, 3, f"uint{bits_of(path, output)}"), film, path)
 

@@ -16,6 +16,8 @@ MAIN_PART = "rgba"
 """The part of a multi-part EXR that holds the beauty, as Nuke names it."""
 
 SCENE_LINEAR, SCENE_UNITS, UNIT_VECTOR, ID = "scene-linear", "scene units", "unit vector", "id"
+AS_STORED = "as stored"
+"""The unit of what another program wrote and nothing tells of."""
 
 MOST_RANKS = 16
 """Of a Cryptomatte."""
