@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
+from defshade_cli.errors import StageError
 from defshade_cli.scene.light import Light
 from defshade_cli.usd.binding import NOTHING_BOUND, Bindings
 from defshade_cli.usd.geometry import Surface
@@ -25,6 +26,9 @@ from defshade_cli.usd.primvars import read_display
 from defshade_cli.usd.skel import Rig
 from defshade_cli.usd.values import within_reach
 from defshade_cli.usd.xform import IDENTITY
+
+MOST_COPIES = 1 << 24
+"""Of one prim: their matrices take 2 GiB. Thirty prims that each instance another twice are a billion."""
 
 
 class Standing(NamedTuple):
@@ -104,8 +108,11 @@ class Placement:
 
 
 def place(pieces: Iterable[Piece], placement: Placement) -> Iterator[Piece]:
-    """Every piece of a subtree at every placement, placement by placement."""
+    """Every piece of a subtree at every placement, placement by placement. Raises StageError for too many."""
     for piece in pieces:
+        count = len(piece.ids) * len(placement.ids)
+        if count > MOST_COPIES:
+            raise StageError(f"{piece.paths[0]} stands {count:,} times, and no more than {MOST_COPIES:,} can be drawn")
         yield replace(
             piece,
             root_from_object=_placed(piece, placement),
