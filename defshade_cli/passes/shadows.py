@@ -31,9 +31,8 @@ from defshade_cli.passes.shadow_atlas import (
 from defshade_cli.passes.shadow_cameras import CUBE_FACES
 from defshade_cli.scene.camera import Camera
 
-_DEPTH_OFFSET = (-2.0, -1.0)
-"""Of what a map stores, in slopes a texel and in steps of depth: at the four texels around a receiver a flat surface is
-up to |∂z/∂x| + |∂z/∂y| nearer. An offset along the light moves no shadow's edge, as one of the receiver would."""
+_DEPTH_OFFSET = (0.0, -1.0)
+"""Of what a map stores, in slopes a texel and in steps of depth: lib/shadow.glsl follows slopes itself."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,7 @@
 
 uniform sampler2D shadow_atlas;
 
-// Receivers count as nearer to the light by a share of a texel, which clears float32 rounding; the records hold it. The maps'
-// own depth offset keeps surfaces from shadowing themselves.
+// Receivers count as nearer to the light by a share of a texel, which clears float32 rounding; the records hold it.
 struct ShadowTexel {
     vec2 place;                // in the atlas, in texels
     vec2 least;                // where its map begins
@@ -66,6 +65,33 @@ ShadowTexel shadow_texel(Light light, vec3 position) {
 #endif
 }
 
+// What surfaces may leave between themselves and their receivers, of their depth's steps from texel to texel: the snapping of
+// vertices to a raster's grid, and bends that are as narrow as a texel.
+const float STEP_OFFSET = 1.0 / 32.0, BEND_OFFSET = 0.5;
+
+struct Casters {
+    vec4 stored;               // depths at the four texels around a receiver
+    vec4 here;                 // where each one's surface goes on to at the receiver
+};
+
+// A texel's surface goes on by its step towards the receiver or by that from behind, whichever lies deeper. On a plane both are
+// right, on a ridge the first, in a hollow the second, and at an edge neither hides what is beyond it. Depths that are
+// compared across a texel instead either shadow slopes by themselves or, offset, let light through where things touch.
+Casters casters_at(vec2 place) {
+    vec2 corner = floor(place + 0.5), t = place + 0.5 - corner;
+    vec2 low = (corner - 1.0) / ATLAS, high = (corner + 1.0) / ATLAS;
+    vec4 ll = textureGather(shadow_atlas, low, 0), hl = textureGather(shadow_atlas, vec2(high.x, low.y), 0);
+    vec4 lh = textureGather(shadow_atlas, vec2(low.x, high.y), 0), hh = textureGather(shadow_atlas, high, 0);
+    vec4 z = vec4(lh.z, hh.w, hl.x, ll.y);
+    vec4 x0 = z - vec4(lh.w, hh.z, hl.y, ll.x), x1 = z.yxwz - z, x = min(x0, x1);
+    vec4 y0 = z - vec4(lh.y, hh.x, hl.w, ll.z), y1 = z.wzyx - z, y = min(y0, y1);
+    vec4 dx = vec4(t.x, 1.0 - t.x, 1.0 - t.x, t.x), dy = vec4(1.0 - t.y, 1.0 - t.y, t.y, t.y);
+    vec4 aside = max(min(z + z.zwxy - z.yxwz - z.wzyx, -max(x, y)), 0.0);
+    vec4 bends = min(abs(x1 - x0), abs(clamp(vec4(0.0), x, max(x0, x1)))) + min(abs(y1 - y0), abs(clamp(vec4(0.0), y, max(y0, y1))));
+    vec4 offset = STEP_OFFSET * (abs(x) + abs(y)) + BEND_OFFSET * bends;
+    return Casters(z, z + x * dx + y * dy + aside * dx * dy - offset);
+}
+
 #ifdef SHADOW_STYLES
 // UsdLuxShadowAPI: how much of each texel's shadow is left at the receiver. What the map knows is the occluder nearest to
 // the light.
@@ -85,11 +111,11 @@ vec4 shadow_strength(Light light, ShadowTexel at, vec4 stored, vec3 position) {
 float visibility(Light light, vec3 position) {
     if (light.shadow_count == 0u) return 1.0;
     ShadowTexel at = shadow_texel(light, position);
-    vec2 place = clamp(at.place, at.least + 0.5, at.least + at.side - 0.5);
-    vec4 stored = textureGather(shadow_atlas, place / ATLAS, 0);
-    vec4 lit = vec4(lessThanEqual(stored, vec4(at.depth)));
+    vec2 place = clamp(at.place, at.least + 1.5, at.least + at.side - 1.5);
+    Casters casters = casters_at(place);
+    vec4 lit = vec4(lessThanEqual(casters.here, vec4(at.depth)));
 #ifdef SHADOW_STYLES
-    lit = 1.0 - (1.0 - lit) * shadow_strength(light, at, stored, position);
+    lit = 1.0 - (1.0 - lit) * shadow_strength(light, at, casters.stored, position);
 #endif
     vec2 t = fract(place - 0.5);
     vec2 row = mix(lit.wx, lit.zy, t.x);
