@@ -50,15 +50,20 @@ class Progress:
 
     @property
     def percent(self) -> float:
+        """How much is done, in [0, 100]."""
         return min(100.0, 100.0 * self.done / self.total)
 
-    def started(self) -> None: ...
+    def started(self) -> None:
+        """Tell that work begins."""
 
-    def finished(self, result: FrameResult | Outcome) -> None: ...
+    def finished(self, result: FrameResult | Outcome) -> None:
+        """Tell of a frame whose files stand."""
 
-    def lost(self, outcome: Outcome) -> None: ...
+    def lost(self, outcome: Outcome) -> None:
+        """Tell of a frame that failed for good."""
 
-    def failed(self, error: DefshadeError) -> None: ...
+    def failed(self, error: DefshadeError) -> None:
+        """Tell of what ended the job."""
 
 
 class Lines(Progress):

@@ -29,6 +29,7 @@ class Size(click.ParamType):
         return int(match[1]), int(match[2])
 
     def text(self, value: tuple[int, int]) -> str:
+        """The value as it is typed."""
         return f"{value[0]}x{value[1]}"
 
 
@@ -45,6 +46,7 @@ class Crop(click.ParamType):
         return x, y, width, height
 
     def text(self, value: Region) -> str:
+        """The value as it is typed."""
         x, y, width, height = value
         return f"{width}x{height}{x:+d}{y:+d}"
 

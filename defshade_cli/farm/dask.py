@@ -72,12 +72,14 @@ class DaskEngine:
         return str(self._client.dashboard_link)
 
     def submit(self, chunk: Chunk) -> None:
+        """Hand a chunk to the cluster; it may start at once."""
         chunk = _anywhere(chunk) if self._remote else chunk
         future = self._client.submit(render_apart, chunk, *self._arguments, pure=False, resources=self._resources)
         self._pending[str(future.key)] = future, chunk
         self._completed.add(future)
 
     def outcomes(self) -> Iterator[Outcome]:
+        """The frames' outcomes as they come, until nothing is left of what was submitted, meanwhile too."""
         for future in self._completed:
             _, chunk = self._pending.pop(str(future.key))
             yield from future.result() if future.status == "finished" else self._lost(chunk, future)

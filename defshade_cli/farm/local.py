@@ -75,9 +75,11 @@ class LocalEngine:
         self._workers.clear()
 
     def submit(self, chunk: Chunk) -> None:
+        """Queue a chunk; workers take it while the outcomes are read."""
         self._queue.append(chunk)
 
     def outcomes(self) -> Iterator[Outcome]:
+        """The frames' outcomes as they come, until nothing is left of what was submitted, meanwhile too."""
         while self._queue or self._busy():
             self._dispatch()
             patience = INTERVAL if self._limits else None

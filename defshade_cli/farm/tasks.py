@@ -32,6 +32,7 @@ class Chunk:
         return [replace(self, job=replace(self.job, frames=(frame,))) for frame in self.job.frames] or [self]
 
     def again(self) -> Chunk:
+        """The same chunk, for another attempt."""
         return replace(self, attempt=self.attempt + 1)
 
 
@@ -56,6 +57,7 @@ class Outcome:
 
     @property
     def stage(self) -> Path:
+        """The file that the frame is of."""
         return self.task.job.stage
 
 
@@ -71,6 +73,7 @@ def joined(tasks: Sequence[Chunk]) -> Chunk:
 
 
 def frame_count(jobs: Iterable[RenderJob]) -> int:
+    """How many frames some jobs have; a job without a range has one."""
     return sum(max(1, len(job.frames)) for job in jobs)
 
 

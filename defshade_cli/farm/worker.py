@@ -48,6 +48,7 @@ def render_chunk(chunk: Chunk, renderer: Renderer, command: str) -> Iterator[Out
 
 
 def main() -> None:
+    """Serve the parent on a connection that it left open; the arguments: its descriptor, command, log level, bytes."""
     descriptor, command, level, memory = sys.argv[1:]
     logging.basicConfig(format="defshade: %(message)s", level=logging.WARNING)
     logging.getLogger("defshade").setLevel(level)

@@ -81,6 +81,7 @@ class Gpu:
 
     @property
     def is_software(self) -> bool:
+        """Whether the processor draws."""
         return "llvmpipe" in self.renderer
 
     @property

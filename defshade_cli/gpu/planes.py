@@ -50,6 +50,7 @@ class Plane:
 
     @property
     def define(self) -> str:
+        """The macro by which shaders know that the plane is there."""
         return f"PLANE_{self.name.upper()}"
 
 

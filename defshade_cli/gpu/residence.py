@@ -51,7 +51,7 @@ class RecordBuffer:
         self._turn = 0
 
     def write(self, records: NDArray) -> None:
-        """Upload `records` and bind the buffer."""
+        """Upload `records` (N,) and bind the buffer."""
         if self._gpu.is_software and self._turn == 0:
             self._gpu.context.finish()
         buffer, self._turn = self._buffers[self._turn], (self._turn + 1) % len(self._buffers)
@@ -198,7 +198,7 @@ class GpuScene:
 
 
 def instance_records(drawables: Sequence[Drawable], eye: NDArray[np.float64]) -> NDArray:
-    """One Instance record a placement, in the drawables' order; differences taken in float64."""
+    """One Instance record a placement (P,), in the drawables' order; differences taken in float64."""
     if not drawables:
         return np.zeros(0, record("Instance"))
     matrices = np.concatenate([d.world_from_object for d in drawables])
@@ -228,7 +228,7 @@ def _normal_matrices(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], 
 
 
 def material_records(materials: Sequence[Material], input_counts: Sequence[int]) -> NDArray:
-    """One Material record each; fields of the same name are copied. input_counts: texture inputs of each."""
+    """One Material record each, (M,); fields of the same name are copied. input_counts: texture inputs of each."""
     dtype = record("Material")
     records = np.zeros(len(materials), dtype)
     for name in sorted(set(dtype.names or ()) - {"first_input", "input_count"}):
@@ -239,7 +239,7 @@ def material_records(materials: Sequence[Material], input_counts: Sequence[int])
 
 
 def draw_commands(drawables: Sequence[Drawable], meshes: Sequence[Mesh]) -> tuple[NDArray, NDArray[np.uint32]]:
-    """Indirect commands, one a subset, and the (instance, material) rows that their base instances point into."""
+    """Indirect commands (S,), one a subset, and the rows (R, 2), instance and material, that they point into."""
     base_vertex, base_index = (_first_rows(meshes) * (1, 3)).T
     commands, rows, first_instance, first_row = [], [], 0, 0
     for drawable in drawables:

@@ -132,7 +132,7 @@ _FITS: tuple[Callable[[Size], Size], ...] = (lambda size: size, _powers_of_two, 
 def place_tiles(
     textures: Sequence[Texture], rows: Mapping[Source, tuple[Size, int, int]], images: Images
 ) -> tuple[NDArray, dict[Texture, tuple[int, int, int, int]]]:
-    """Tile records, dense by UDIM number, and where each texture that has any tile finds its own."""
+    """Tile records (N,), dense by UDIM number, and where each texture that has any tile finds its own."""
     records: list[NDArray] = []
     places, first = {}, 0
     for texture in textures:
@@ -163,7 +163,7 @@ def _wraps(texture: Texture, image: TexelImage) -> tuple[int, int]:
 def input_records(
     materials: Sequence[Material], found: TextureSet, slots: Mapping[str, int]
 ) -> tuple[NDArray, list[int]]:
-    """TextureInput records, material by material, and how many each has.  slots: see gpu.vertices.uv_slots."""
+    """TextureInput records (N,), material by material, and how many each has.  slots: see gpu.vertices.uv_slots."""
     usable = [
         [(name, i) for name, i in m.inputs.items() if i.texture in found.places and (i.uv in slots or not i.uv)]
         for m in materials

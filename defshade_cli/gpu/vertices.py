@@ -65,7 +65,7 @@ def vertex_arrays(
     layer_uv: bool = False,
     primvars: Sequence[str] = (),
 ) -> list[NDArray]:
-    """Positions, normals and indices; colours a vertex and texture coordinates where they are asked for."""
+    """Positions (V, 3), normals (V, 3), indices (T, 3); colours (V, 3) and coordinates (V, 2) where asked for."""
     arrays = [
         _joined([m.points for m in meshes], 3),
         _joined([m.normals for m in meshes], 3),

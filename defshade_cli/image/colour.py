@@ -113,7 +113,7 @@ def picture(layer: Layer, pixels: Pixels, transform: DisplayTransform, *, alpha:
 
 
 def finite(pixels: Pixels) -> Pixels:
-    """Pixels without NaN and infinity, on which OCIO's SIMD paths spoil the alpha of the pixel too."""
+    """Pixels (H, W, C) without NaN and infinity, on which OCIO's SIMD paths spoil the alpha of the pixel too."""
     if abs(pixels.min()) <= BRIGHTEST and abs(pixels.max()) <= BRIGHTEST:
         return pixels
     return np.nan_to_num(pixels, nan=0.0).clip(-BRIGHTEST, BRIGHTEST)

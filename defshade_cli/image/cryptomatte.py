@@ -104,7 +104,7 @@ class Coverage:
             left = _put(self._slots[-1], left, numbers)
 
     def seen(self) -> NDArray[np.int32]:
-        """The numbers that some pixel shows, ascending."""
+        """The numbers (N,) that some pixel shows, ascending."""
         found = [np.unique(slot.number) for slot in self._slots]
         every = np.unique(np.concatenate([np.empty(0, np.int32), *found]))
         return every[every >= 0]

@@ -25,7 +25,7 @@ def jpeg_address(colors: Pixels) -> str:
 
 
 def png_address(colors: Pixels) -> str:
-    """The `data:` address of a PNG, likewise."""
+    """The `data:` address of a PNG of colours (H, W, 1 or 3) in [0, 1]."""
     return "data:image/png;base64," + text(png(colors))
 
 

@@ -59,7 +59,7 @@ def parts(path: Path) -> Iterator[tuple[oiio.ImageSpec, NDArray]]:
 
 
 def uncropped(spec: oiio.ImageSpec, pixels: NDArray) -> NDArray:
-    """The pixels of a data window in the display window of its header, zeros around them."""
+    """The pixels (H, W, C) of a data window in the display window of its header, zeros around them."""
     whole = (spec.full_height, spec.full_width)
     top, left = spec.y - spec.full_y, spec.x - spec.full_x
     if (top, left) == (0, 0) and pixels.shape[:2] == whole:

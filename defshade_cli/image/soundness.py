@@ -49,7 +49,7 @@ def check(film: Film) -> FrameCheck:
 
 
 def filled(film: Film, odd: Mapping[str, NDArray[np.bool_]]) -> Film:
-    """The film with the value of the nearest sound pixel in each odd one; 0 where no pixel is sound."""
+    """The film with the value of the nearest sound pixel in each odd one (H, W); 0 where none is sound."""
     return replace(film, layers=film.layers | {name: _filled(film.layers[name], mask) for name, mask in odd.items()})
 
 

@@ -63,6 +63,7 @@ def lobe_albedo(visibility: Visibility, cosine: float, alpha: float, *, points: 
 
 
 def albedo_table(visibility: Visibility, cosines: Array = COSINES, alphas: Array = ALPHAS) -> AlbedoTable:
+    """Albedos of the lobe by cosine (C,) and α (A,): integrals over the hemisphere, (A, C) each."""
     albedos = np.array([[lobe_albedo(visibility, mu, alpha) for mu in cosines] for alpha in alphas])
     return AlbedoTable(cosines, alphas, albedos[..., 0], albedos[..., 1])
 
@@ -103,6 +104,7 @@ def excess(table: AlbedoTable, fit: EdgeFit) -> Array:
 
 
 def main() -> None:
+    """Print the fitted coefficients of every shading model, and how far off they are."""
     for shading in SHADINGS:
         table = albedo_table(VISIBILITY[shading])
         fit = fit_edge(table)

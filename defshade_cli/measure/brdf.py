@@ -83,6 +83,7 @@ class Angles:
 
     @classmethod
     def between(cls, n: Array, v: Array, l: Array) -> Angles:  # noqa: E741
+        """The cosines between unit vectors (..., 3): normal, towards the eye and towards the light."""
         h = normalize(v + l)
         return cls(np.maximum(_dot(n, v), MIN_NOV), _dot(n, l), _dot(n, h), _dot(v, h))
 

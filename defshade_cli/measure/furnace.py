@@ -77,6 +77,7 @@ def fibonacci_lattice(points: int) -> tuple[Array, Array]:
 
 
 def spherical(cos_theta: Array, phi: Array) -> Array:
+    """Unit vectors (..., 3) at angles around +z, in radians."""
     sin_theta = np.sqrt(np.maximum(1.0 - cos_theta**2, 0.0))
     return np.stack([sin_theta * np.cos(phi), sin_theta * np.sin(phi), cos_theta], axis=-1)
 

@@ -76,6 +76,7 @@ def referenced_stages() -> list[Path]:
 
 
 def main(page: Path) -> None:
+    """Measure every stage that has a reference, and write the table into the page."""
     stages = referenced_stages()
     with Gpu() as gpu:
         pipeline = Pipeline(gpu)

@@ -11,7 +11,10 @@ _LLVM = (*(f"libLLVM.so.{version}.1" for version in range(22, 17, -1)), "libLLVM
 
 
 def find_llvm() -> None:
-    """Name the newest LLVM there is to Dr.Jit, whose own search may take one too old for the processor."""
+    """Name the newest LLVM there is to Dr.Jit, whose own search may take one too old for the processor.
+
+    Raises DefshadeError where none loads.
+    """
     if "DRJIT_LIBLLVM_PATH" in os.environ:
         return
     for name in _LLVM:

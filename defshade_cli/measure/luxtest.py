@@ -63,6 +63,7 @@ class Agreement:
 
     @property
     def median(self) -> float:
+        """The middle one of the ratios."""
         return float(np.median(self.ratios))
 
     @property
@@ -164,6 +165,7 @@ def table(results: list[Agreement]) -> str:
 
 
 def main(assets: Path, page: Path) -> None:
+    """Measure luxtest's sweeps, and write the table into the page."""
     with Gpu() as gpu:
         pipeline = Pipeline(gpu)
         results = [agreement(pipeline, sweep, samples=256) for sweep in sweeps(assets)]

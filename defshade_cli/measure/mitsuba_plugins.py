@@ -123,6 +123,7 @@ class PreviewSurface(mi.BSDF):
         return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
 
     def to_string(self) -> str:
+        """What Mitsuba prints."""
         return "PreviewSurface[]"
 
 
@@ -160,6 +161,7 @@ class ShapedArea(mi.Emitter):
         return dr.select(active & (dr.dot(ds.d, ds.n) < 0), self._emitted(-ds.d), 0.0)
 
     def to_string(self) -> str:
+        """What Mitsuba prints."""
         return "ShapedArea[]"
 
 

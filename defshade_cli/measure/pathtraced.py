@@ -38,6 +38,7 @@ class Reference:
 
     @property
     def radiance(self) -> NDArray[np.float32]:
+        """(H, W, 3) scene-linear, the mean of both halves."""
         return self.halves.mean(axis=0)
 
 

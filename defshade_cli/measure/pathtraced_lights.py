@@ -26,7 +26,7 @@ _FINER = 4  # Mitsuba interpolates a sky's pixels, which finer ones leave as fla
 
 
 def emitter(light: Light, centre: NDArray[np.float64], radius: float) -> Any:
-    """What mi.load_dict takes; centre, radius: of the scene. Raises DefshadeError for what it does not know."""
+    """What mi.load_dict takes; centre (3,), radius: of the scene. Raises DefshadeError for what it does not know."""
     match light:
         case DistantLight():
             return _distant(light, centre, radius)
@@ -135,12 +135,15 @@ def _shown(light: RectLight) -> dict[str, Any]:
 
 
 def rgb(color: NDArray[np.float64]) -> dict[str, Any]:
+    """A colour (3,) as Mitsuba's dictionaries have it."""
     return {"type": "rgb", "value": color.tolist()}
 
 
 def vector(values: NDArray[np.float64]) -> Any:
+    """A vector (3,) of Mitsuba's."""
     return mi.ScalarVector3f(*values.tolist())
 
 
 def transform(matrix: Matrix) -> Any:
+    """A matrix (4, 4) of Mitsuba's."""
     return mi.ScalarTransform4f(matrix)

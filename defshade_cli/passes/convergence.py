@@ -46,6 +46,7 @@ class Convergence:
 
     @property
     def has_arrived(self) -> bool:
+        """Whether the estimated error is as small as was asked."""
         return self._max_error is not None and self.estimate <= self._max_error
 
     def judge(self, luminance: NDArray[np.float32], variance: NDArray[np.float32], samples: int) -> None:

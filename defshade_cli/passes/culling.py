@@ -35,6 +35,7 @@ class CommandBuffer:
         self._ends = np.zeros(1, np.int64)
 
     def write(self, runs: Sequence[NDArray]) -> None:
+        """Upload runs of draw commands, (N,) records each, one behind the other."""
         data = np.concatenate(runs).tobytes()
         self._ends = np.cumsum([0, *map(len, runs)])
         self._buffer.orphan(max(len(data), self._buffer.size))

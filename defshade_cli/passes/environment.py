@@ -51,12 +51,14 @@ class EnvironmentVariant:
 
     @classmethod
     def of(cls, plan: Plan, dome: PlannedLight) -> EnvironmentVariant:
+        """What the shader of a dome must know of the plan."""
         orthographic = plan.camera.projection == "orthographic"
         shows = plan.samples == 1, plan.background, plan.hides_sky(dome)
         return cls(plan.planes, plan.layout, orthographic, *shows, plan.outputs, plan.most_groups, plan.render_space)
 
     @property
     def defines(self) -> list[str]:
+        """The shader's macros."""
         flags = ["ORTHOGRAPHIC"] * self.orthographic + ["ANALYTIC"] * self.analytic + ["BACKGROUND"] * self.background
         flags += ["OCCLUSION"] * self.occlusion
         return (

@@ -71,6 +71,7 @@ class GBufferVariant:
 
     @property
     def defines(self) -> list[str]:
+        """The shader's macros."""
         flags = ["CUTOUT"] * self.cutout + ["DISPLAY_COLOR_VARIES"] * self.color_varies
         flags += ["TRANSPARENT", "POSITION"] * self.transparent + ["ORTHOGRAPHIC"] * self.orthographic
         flags += ["TEXTURES", "POSITION"] * bool(self.texture_groups) + ["MANY_UVS"] * self.many_uvs
@@ -105,7 +106,7 @@ class GBufferPass:
         *,
         whole: bool = False,
     ) -> None:
-        """What the bound View of `camera` may see of `draws`, in a multi-draw of what is solid and one of what is not.
+        """What `camera` sees of `draws` (D,) by the bound View: a multi-draw of what is solid, one of what is not.
 
         Both sides of every face.
 

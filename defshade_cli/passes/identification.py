@@ -34,7 +34,7 @@ def id_values(layer: str, visible: NDArray[np.uint32], identities: Identities) -
 
 
 def id_manifests(layers: Mapping[str, NDArray[np.float32]], scene: Scene) -> Manifests:
-    """What the ids of some layers stand for, those that the picture shows."""
+    """What the ids of some layers (H, W, 1) stand for, those that the picture shows."""
     identities = Identities(scene)
     every = {layer: _names(layer, identities) for layer in layers}
     return {

@@ -30,7 +30,7 @@ def light_records(
     shadows: ShadowAtlas | None,
     tables: LightTables = NO_TABLES,
 ) -> NDArray:
-    """One Light record each, positions relative to the eye."""
+    """One Light record each, (L,); positions relative to the eye (3,)."""
     records = np.zeros(len(lights), record("Light"))
     if not len(records):
         return records

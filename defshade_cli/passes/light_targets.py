@@ -37,6 +37,7 @@ class LightTargets:
         return self._framebuffers[names]
 
     def clear(self) -> None:
+        """Start all sums at nothing."""
         for target in self.sums.values():
             target.framebuffer.clear()
 

@@ -47,7 +47,7 @@ class LightTiles:
         self._array = cache(lambda variant: self._screen.array(_compile(gpu, variant, self._most)))
 
     def begin(self, gbuffer: GBuffer, view: NDArray, plan: Plan) -> None:
-        """What the tiles show, by the GBuffer and the View record that it was drawn with."""
+        """What the tiles show, by the GBuffer and the View record (1,) that it was drawn with."""
         self._plan, perspective = plan, plan.camera.projection == "perspective"
         ranges = self._depth_ranges(gbuffer.layout, perspective)
         depths = ranges.read(gbuffer, self._frame, plan.size)
@@ -65,7 +65,7 @@ class LightTiles:
         shadows: ShadowAtlas | None = None,
         tables: LightTables = NO_TABLES,
     ) -> None:
-        """All `lights` on top of what the targets hold; those whose shaders cost more, for shape or shadows, apart."""
+        """All `lights`, records (L,), on top of the targets; those that cost more, for shape or shadows, apart."""
         self._context.enable_only(moderngl.BLEND)
         self._context.blend_func = moderngl.ONE, moderngl.ONE
         maps = shadows.count.tolist() if shadows else [0] * len(lights)
@@ -129,7 +129,7 @@ def _compile(gpu: Gpu, variant: LightingVariant, most: int) -> moderngl.Program:
 
 
 def light_bounds(records: NDArray, camera_from_relative: NDArray[np.float64]) -> LightBounds:
-    """Of Light records."""
+    """Of Light records (L,). camera_from_relative: (4, 4)."""
     rotation, offset = camera_from_relative[:3, :3], camera_from_relative[:3, 3]
     return LightBounds(
         centre=records["position"].astype(np.float64) @ rotation.T + offset,

@@ -87,6 +87,7 @@ class LightingVariant:
 
     @property
     def defines(self) -> list[str]:
+        """The shader's macros."""
         flags = ["CLASSIC"] * (self.shading == "classic") + ["ORTHOGRAPHIC"] * self.orthographic
         flags += (
             ["SHADOWS"] * bool(self.shadows)

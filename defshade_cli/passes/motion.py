@@ -16,7 +16,7 @@ from defshade_cli.scene.scene import Scene
 
 
 def motion_records(scene: Scene, plan: Plan) -> NDArray:
-    """One Motion record a placement, in the drawables' order; products taken in float64."""
+    """One Motion record a placement (P,), in the drawables' order; products taken in float64."""
     seen = [_seen(plan.camera, [d.world_from_object for d in scene.drawables], plan)] * 3
     for number, moment in zip((0, 2), scene.neighbours, strict=False):
         seen[number] = _seen(_framed(moment.camera, scene, plan), moment.placements, plan)

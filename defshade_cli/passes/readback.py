@@ -34,7 +34,7 @@ def read_planes(gbuffer: GBuffer, wanted: Iterable[Plane], plan: Plan) -> Planes
 
 
 def data_layers(planes: Planes, plan: Plan, scene: Scene) -> dict[str, NDArray[np.float32]]:
-    """The data layers that the plan asks for, background filled in."""
+    """The data layers (H, W, C) that the plan asks for, background filled in."""
     covered, identities = np.isfinite(planes["depth"]), Identities(scene)
     layers = {}
     for name in plan.data_layers:

@@ -48,6 +48,7 @@ class Screen:
         return self._gpu.keep(self._gpu.context.vertex_array(program, [(self._regions, "4f/i", "region")]))
 
     def draw(self, array: moderngl.VertexArray) -> None:
+        """Draw a quad for each of the regions; nothing where there is none."""
         if self._count:
             array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=self._count)
 

@@ -90,7 +90,7 @@ def _moved(camera: Camera, resolution: int, jitter: tuple[float, float]) -> Came
 
 
 def clip_from_relative(camera: Camera) -> Matrix:
-    """What draws a map."""
+    """(4, 4) what draws a map."""
     return _projection(camera) @ camera.camera_from_world
 
 
@@ -99,7 +99,7 @@ def _projection(camera: Camera) -> Matrix:
 
 
 def map_records(maps: Sequence[Camera], slots: Sequence[int], resolution: int) -> NDArray:
-    """ShadowMap records of those of `maps` that are in `slots`; as many as the shaders' block has."""
+    """ShadowMap records (N,) of those of `maps` that are in `slots`; as many as the shaders' block has."""
     records = np.zeros(_MOST_RECORDS, record("ShadowMap"))
     for row, slot in zip(records, slots, strict=False):
         x, y = viewport(slot, resolution)[:2]

@@ -49,6 +49,7 @@ class ShadowVariant:
 
     @property
     def defines(self) -> list[str]:
+        """The shader's macros."""
         read = ["TRANSPARENT"] * self.transparent + ["DISPLAY_COLOR_VARIES"] * self.color_varies
         read += ["TEXTURES"] * bool(self.texture_groups) + ["MANY_UVS"] * self.many_uvs + space_defines(self.space)
         return (["CUTOUT", *read] if self.cutout else []) + ["LINKS"] * self.linked

@@ -30,6 +30,7 @@ class Stopping:
         return BatchMeansPass(self._gpu, self._frame, self._screen)
 
     def begin(self, plan: Plan) -> None:
+        """Start a frame: its clock, and its error as unknown."""
         self._plan, self._start = plan, time.perf_counter()
         self._convergence = Convergence(plan.size, plan.max_error)
         self._variance = np.broadcast_to(np.float32(np.inf), (plan.size[1], plan.size[0], 1))

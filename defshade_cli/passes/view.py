@@ -60,7 +60,7 @@ def _seen_from(lens: NDArray[np.float64], camera: Camera, window: Window) -> Win
 
 
 def clip_from_camera(camera: Camera, window: Window, clip: tuple[float, float], standard: bool) -> Matrix:
-    """Projection to depth [0, 1]: 1 at the near plane (reversed), or 0 there in the `standard` sense."""
+    """Projection (4, 4) to depth [0, 1]: 1 at the near plane (reversed), or 0 there in the `standard` sense."""
     left, right, bottom, top = window
     near, far = clip
     matrix = np.zeros((4, 4))
@@ -85,7 +85,7 @@ def depth_coefficients(camera: Camera, clip: tuple[float, float], standard: bool
 
 
 def camera_depth(camera: Camera, clip: tuple[float, float], standard: bool, stored: NDArray) -> NDArray[np.float64]:
-    """Planar depth (scene units) of stored values, +inf where nothing was drawn."""
+    """Planar depth (scene units) of stored values (H, W), +inf where nothing was drawn."""
     scale, offset = depth_coefficients(camera, clip, standard)
     linear = scale * stored.astype(np.float64) + offset
     depth = 1.0 / linear if camera.projection == "perspective" else linear

@@ -176,6 +176,7 @@ class Plan:
 
     @property
     def domes(self) -> tuple[PlannedLight, ...]:
+        """Those of the lights that are skies."""
         return tuple(planned for planned in self.lights if isinstance(planned.light, DomeLight))
 
     def hides_sky(self, planned: PlannedLight) -> bool:

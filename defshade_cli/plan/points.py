@@ -21,7 +21,7 @@ _SMALL, _MIDDLING = 0.03, 0.12
 
 
 def apparent_size(light: Light, bounds: NDArray[np.float64]) -> float:
-    """The light's radius over its distance, seen from the middle of the geometry."""
+    """The light's radius over its distance, seen from the middle of the geometry. bounds: (2, 3)."""
     if light.is_infinite or not np.isfinite(bounds).all():
         return light.spread
     distance = float(np.linalg.norm(bounds.mean(axis=0) - light.position))

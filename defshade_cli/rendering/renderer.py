@@ -49,6 +49,7 @@ class Renderer:
         return self._displays[device, transform]
 
     def close(self) -> None:
+        """Free what is held on all devices."""
         for kept in (self._gpus, self._pipelines, self._displays):
             kept.clear()
         self._stack.close()

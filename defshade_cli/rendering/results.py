@@ -37,10 +37,12 @@ class FrameResult:
 
     @property
     def paths(self) -> tuple[Path, ...]:
+        """The files of all images."""
         return tuple(path for image in self.images for path in image.paths)
 
     @property
     def skipped(self) -> bool:
+        """Whether all images stood already."""
         return all(image.skipped for image in self.images)
 
     @property

@@ -33,4 +33,5 @@ class Stills:
         return picture if then.job == shot.job and scene.is_still(before) else None
 
     def keep(self, shot: Shot, scene: Scene, picture: Picture) -> None:
+        """Remember the last picture of a product, and what it is of."""
         self._last[shot.product.path] = shot, scene, picture

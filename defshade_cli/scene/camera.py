@@ -83,10 +83,12 @@ class Camera:
 
     @property
     def camera_from_world(self) -> Matrix:
+        """(4, 4) float64, the inverse of where the camera stands."""
         return inverse_rigid(self.world_from_camera)
 
     @property
     def aspect(self) -> float:
+        """Width of the window over its height."""
         left, right, bottom, top = self.window
         return (right - left) / (top - bottom)
 

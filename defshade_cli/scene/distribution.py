@@ -33,14 +33,14 @@ class GridDistribution:
 
 
 def cumulative(weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distribution function along the last axis; even where all weights are 0."""
+    """Distribution function (..., N) along the last axis; even where all weights are 0."""
     total = weights.sum(axis=-1, keepdims=True)
     even = np.where(total > 0, weights, 1.0)
     return np.cumsum(even, axis=-1) / even.sum(axis=-1, keepdims=True)
 
 
 def step_at(distribution: NDArray[np.float64], u: float) -> tuple[int, float]:
-    """The step that `u` falls on, and how far into it, in [0, 1]."""
+    """The step of a distribution (N,) that `u` falls on, and how far into it, in [0, 1]."""
     index = min(int(np.searchsorted(distribution, u, side="right")), len(distribution) - 1)
     before = float(distribution[index - 1]) if index else 0.0
     step = float(distribution[index]) - before

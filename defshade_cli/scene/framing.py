@@ -35,6 +35,7 @@ class Framing:
 
     @property
     def name(self) -> str:
+        """What file names and headers call the camera."""
         return "turntable" if self.turn else "fit"
 
     def camera(self, bounds: NDArray[np.float64], up_axis: str, window: Window, frame: float | None) -> Camera:
@@ -66,9 +67,11 @@ class Held:
 
     @property
     def name(self) -> str:
+        """What file names and headers call the camera."""
         return "held"
 
     def camera(self, bounds: NDArray[np.float64], up_axis: str, window: Window, frame: float | None) -> Camera:
+        """The camera as it is, whatever is in view. bounds: (2, 3), unused."""
         return self.held
 
 

@@ -56,7 +56,7 @@ class Identities:
         return by_prim[self.prim]
 
     def faces(self, numbers: NDArray[np.uint32], triangles: NDArray[np.uint32]) -> Table:
-        """The authored face behind triangles, counted from the first of their row's subset."""
+        """The authored face behind triangles (N,), counted from the first of their row's subset."""
         return self._faces[self._first_triangle[numbers] + triangles]
 
     @cached_property

@@ -56,6 +56,7 @@ class IesProfile:
 
     @property
     def peak(self) -> float:
+        """Candela, the greatest of all directions."""
         return float(self.candela.max())
 
     @cached_property

@@ -30,10 +30,12 @@ class DataWindow:
 
     @property
     def origin(self) -> tuple[int, int]:
+        """(x, y) of the upper left pixel."""
         return self.x, self.y
 
     @property
     def size(self) -> tuple[int, int]:
+        """(width, height) in pixels."""
         return self.width, self.height
 
     def tiles(self, side: int) -> list[DataWindow]:

@@ -39,10 +39,12 @@ class Kind:
 
     @property
     def closed(self) -> bool:
+        """Whether curves end where they begin."""
         return self.wrap == "periodic"
 
     @property
     def pinned(self) -> bool:
+        """Whether curves are carried on to their first and last control points."""
         return self.wrap == "pinned" and self.basis in ("bspline", "catmullRom")
 
     def segments(self, counts: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -55,7 +57,7 @@ class Kind:
         return np.where(fits, np.maximum(found, 0), 0)
 
     def elements(self, counts: NDArray[np.int64], points: int) -> dict[str, int]:
-        """How many values each interpolation needs on curves of so many points each."""
+        """How many values each interpolation needs on curves of so many points each, (C,)."""
         varying = int((self.segments(counts) + (0 if self.closed else 1)).sum())
         return {
             "constant": 1,
@@ -81,6 +83,7 @@ class CurveSamples:
 
     @property
     def count(self) -> int:
+        """How many samples there are of all curves."""
         return len(self.curve)
 
     def at(self, primvar: Primvar) -> NDArray[np.float64]:
@@ -98,7 +101,7 @@ class CurveSamples:
 
 
 def sample_curves(kind: Kind, counts: NDArray[np.int64], points: int, detail: int) -> CurveSamples:
-    """Samples of curves of so many points each, `detail` a segment; a linear one needs one."""
+    """Samples of curves of so many points each, (C,), `detail` a segment; a linear one needs one."""
     detail = 1 if kind.basis == "linear" else detail
     segments = kind.segments(counts)
     rows = segments * detail + np.where(segments > 0, not kind.closed, 0)
@@ -117,6 +120,7 @@ class Places(NamedTuple):
 
 
 def sample_at(kind: Kind, counts: NDArray[np.int64], points: int, places: Places) -> CurveSamples:
+    """Weights that take control points to the places. counts: (C,) control points of each curve; points: of all."""
     varying_counts = kind.segments(counts) + (0 if kind.closed else 1)
     return CurveSamples(
         places.curve,
@@ -127,7 +131,7 @@ def sample_at(kind: Kind, counts: NDArray[np.int64], points: int, places: Places
 
 
 def control_samples(kind: Kind, counts: NDArray[np.int64], points: int, closed: bool) -> CurveSamples:
-    """A sample at every control point, as if the curves were lines between these, closed ones or open."""
+    """A sample at every control point (P,), as if the curves were lines between these, closed ones or open."""
     segments = kind.segments(counts)
     rows = np.where(segments > 0, counts, 0)
     curve = np.repeat(np.arange(len(counts)), rows)

@@ -24,6 +24,7 @@ Profile = Sequence[tuple[float, float]]
 
 
 def sphere_cage(radius: float) -> Polygons:
+    """The cage of a UsdGeomSphere, as OpenUSD's UsdImaging builds it. radius: in scene units."""
     rings = [_on_sphere(radius, 0.0, math.pi * (k / SEGMENTS - 0.5)) for k in range(1, SEGMENTS)]
     return _swept([rings], bottom=-radius, top=radius)
 

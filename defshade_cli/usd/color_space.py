@@ -18,6 +18,7 @@ _SRGB = Gf.ColorSpace(Gf.ColorSpaceNames.SRGBRec709)
 
 
 def is_color(attribute: Usd.Attribute) -> bool:
+    """Whether the attribute's role is colour."""
     return attribute.GetRoleName() == "Color"
 
 
@@ -59,6 +60,7 @@ def space_named(name: str) -> Gf.ColorSpace | None:
 
 
 def is_known(name: str) -> bool:
+    """Whether USD knows the colour space by this name."""
     return bool(Gf.ColorSpace.IsValid(name))
 
 

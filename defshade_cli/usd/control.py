@@ -40,6 +40,7 @@ class Control:
     face_varying: LinearInterpolation = _FACE_VARYING_FALLBACK
 
     def equals(self, other: Control) -> bool:
+        """Whether both subdivide alike: topology and face-varying indices are the same."""
         return self.face_varying == other.face_varying and (
             self.topology is other.topology or self.topology.equals(other.topology)
         )

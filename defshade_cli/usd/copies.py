@@ -29,13 +29,14 @@ class Copies:
         return self.object_from_copy[:, :3, 3].astype(np.float32)
 
     def moved(self, positions: NDArray[np.float32]) -> Copies:
+        """The copies at other positions (N, 3), turned and scaled as they are."""
         matrices = self.object_from_copy.copy()
         matrices[:, :3, 3] = positions
         return replace(self, object_from_copy=matrices)
 
 
 def once(display_color: NDArray[np.float32] | None = None, display_opacity: float | None = None) -> Copies:
-    """A single copy, where the prim is."""
+    """A single copy, where the prim is. display_color: (3,)."""
     if display_color is None and display_opacity is None:
         return _ONCE
     color, opacity = (np.nan if value is None else value for value in (display_color, display_opacity))

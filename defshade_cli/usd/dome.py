@@ -15,6 +15,7 @@ _Z_UP = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], np.f
 
 
 def is_dome(prim: Usd.Prim) -> bool:
+    """Whether the prim is a dome light, of either version of the schema."""
     return prim.IsA(UsdLux.DomeLight) or prim.IsA(UsdLux.DomeLight_1)
 
 

@@ -78,10 +78,12 @@ class Surface:
 
     @property
     def mean_edge(self) -> float:
+        """Root of the mean square of the edges' lengths, in scene units."""
         return flatness(self.polygons).mean_edge
 
     @property
     def rise(self) -> float:
+        """How far the surface rises over its cage, in scene units."""
         return flatness(self.polygons).rise
 
 
@@ -194,6 +196,7 @@ def only_points_vary(prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[st
 def is_time_varying(
     prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = (), said: Said | None = None
 ) -> bool:
+    """Whether anything that is read of the prim has more than one value over time."""
     return bool(varying_names(prim, color, shown, said))
 
 

@@ -47,6 +47,7 @@ def plane(width: float, length: float) -> Polygons:
 
 
 def sphere(radius: float, segments: int = SEGMENTS) -> Polygons:
+    """A UsdGeomSphere as polygons. radius: in scene units."""
     return revolve([arc(radius, 0.0, -math.pi / 2, math.pi / 2, segments)], segments)
 
 
@@ -57,6 +58,7 @@ def frustum(height: float, top: float, bottom: float) -> Polygons:
 
 
 def cone(height: float, radius: float) -> Polygons:
+    """A UsdGeomCone along z as polygons, its tip up. height, radius: in scene units."""
     return frustum(height, 0.0, radius)
 
 

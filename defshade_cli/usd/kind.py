@@ -51,6 +51,7 @@ class Kinds:
         self._of_type: dict[str, Nature] = {}
 
     def of(self, prim: Usd.Prim) -> Nature:
+        """What the prim is; prims of one type are asked once."""
         type_name = prim.GetTypeName()
         if type_name not in self._of_type:
             self._of_type[type_name] = Nature(_classify(prim), prim.IsA(UsdGeom.Imageable), prim.IsA(UsdSkel.Root))

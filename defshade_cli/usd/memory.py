@@ -101,6 +101,7 @@ class Memory:
         return next((name for name in read if name), DISPLAY_COLOR)
 
     def material(self, path: Sdf.Path, time: Usd.TimeCode) -> ReadMaterial:
+        """The material at a path; read once where it does not change over time."""
         if path in self._materials:
             return self._materials[path]
         try:

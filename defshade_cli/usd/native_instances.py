@@ -46,6 +46,7 @@ class NativeInstances:
         self._shared: dict[Sharing, list[Instance]] = defaultdict(list)
 
     def add(self, prim: Usd.Prim, here: Standing) -> None:
+        """Note an instance, with those that share its prototype and all that it inherits."""
         prototype = prim.GetPrototype().GetPath()
         animation = self._memory.rigs.animation_of(here.on_stage(prim))
         sharing = Sharing(prototype, animation, self._memory.bindings(prim.GetPath()), here.in_world, here.purpose)

@@ -28,6 +28,7 @@ class Palette:
 
     @property
     def materials(self) -> tuple[Material, ...]:
+        """In the order of their numbers."""
         return tuple(self._numbers)
 
     def number(self, bindings: Bindings) -> int:

@@ -179,6 +179,7 @@ class Polygons:
         return tuple(said), found.digest()
 
     def without_holes(self) -> Polygons:
+        """Without the faces that are holes."""
         return self.select(~np.isin(self.faces, self.holes)) if len(self.holes) else self
 
     def joined(self) -> Polygons:

@@ -23,7 +23,7 @@ def read_positions(prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode | None
 
 
 def still_positions(prim: Usd.Prim, time: Usd.TimeCode) -> NDArray[np.float32] | None:
-    """The same of a prim that no velocities carry."""
+    """(P, 3), the same of a prim that no velocities carry."""
     value = prim.GetAttribute("points").Get(time)
     return np.asarray(value) if isinstance(value, Vt.Vec3fArray) else None
 

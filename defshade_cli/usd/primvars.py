@@ -43,6 +43,7 @@ class Carried(NamedTuple):
     uvs: Mapping[str, Primvar] = MappingProxyType({})
 
     def laid_on(self, polygons: Polygons) -> Polygons:
+        """The polygons with these primvars."""
         return polygons if self is NOTHING_CARRIED else replace(polygons, **self._asdict())
 
 
@@ -50,10 +51,12 @@ NOTHING_CARRIED = Carried()
 
 
 def count_elements(faces: int, points: int, corners: int) -> Elements:
+    """How many values a primvar has by its interpolation."""
     return {"constant": 1, "uniform": faces, "varying": points, "vertex": points, "faceVarying": corners}
 
 
 def authored(primvar: UsdGeom.Primvar | None, time: Usd.TimeCode) -> Authored | None:
+    """The primvar's values, colours in linear Rec.709; None where nothing is authored."""
     if not primvar or not primvar.HasValue():
         return None
     indices = primvar.GetIndices(time) if primvar.IsIndexed() else None

@@ -32,6 +32,7 @@ class Refiner:
         self._face_varying: dict[bytes, tuple[Stencils, NDArray[np.int32]]] = {}
 
     def fits(self, control: Control, level: int) -> bool:
+        """Whether it serves this control cage at this level."""
         return level == self.level and (control is self.control or control.equals(self.control))
 
     def refine(self, cage: Polygons) -> Polygons:

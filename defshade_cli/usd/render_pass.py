@@ -19,9 +19,11 @@ class PassRules:
     visibility: Usd.CollectionMembershipQuery
 
     def prunes(self, path: Sdf.Path) -> bool:
+        """Whether the pass leaves out the prim at this path."""
         return bool(self.prune.IsPathIncluded(path))
 
     def shows(self, path: Sdf.Path) -> bool:
+        """Whether the pass lets the camera see the prim at this path."""
         return bool(self.visibility.IsPathIncluded(path))
 
 

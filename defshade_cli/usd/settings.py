@@ -56,6 +56,7 @@ class StageSettings:
         return replace(camera, shutter=(opens, opens if self.instantaneous else closes), f_stop=f_stop)
 
     def pixel_aspect_for(self, camera: Camera) -> float:
+        """Width of a pixel over its height, as authored, else what fills the resolution with the camera's window."""
         if self.pixel_aspect is not None or self.resolution is None:
             return self.pixel_aspect or 1.0
         width, height = self.resolution

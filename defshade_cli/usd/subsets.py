@@ -37,7 +37,7 @@ class Faces:
     group: NDArray[np.intp] | None = None
 
     def groups_of(self, faces: NDArray[np.int32]) -> tuple[str, ...]:
-        """The paths of the groups that these faces are in, in order."""
+        """The paths of the groups that these faces (N,) are in, in order."""
         if self.group is None:
             return self.paths if len(faces) else ()
         return tuple(self.paths[number] for number in np.unique(self.group[faces]))

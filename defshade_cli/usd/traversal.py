@@ -66,6 +66,7 @@ class Traversal:
         memory.xforms.SetTime(time)
 
     def read_stage(self) -> tuple[Piece, ...]:
+        """All that is drawn of the stage; what stands nowhere is reported."""
         pieces, lost = finite(self._read(self._stage.GetPseudoRoot().GetChildren(), Standing(draw_mode=FULL)))
         self.issues.update(dict.fromkeys(Unsupported(path, STANDS_NOWHERE) for path in lost))
         return pieces

@@ -24,7 +24,7 @@ _LONGEST_MITRE = 4.0
 
 
 def tubes(samples: CurveSamples, centres: Vectors, radii: NDArray[np.float64], sides: int) -> Polygons:
-    """Round, `sides` points a sample, open at their ends."""
+    """Round, `sides` points a sample, open at their ends. centres (N, 3), radii (N,): in scene units."""
     course = _course(samples, centres)
     across = _frames(samples, course.tangent)
     angle = np.arange(sides) * (2.0 * math.pi / sides)
@@ -35,7 +35,10 @@ def tubes(samples: CurveSamples, centres: Vectors, radii: NDArray[np.float64], s
 
 
 def ribbons(samples: CurveSamples, centres: Vectors, radii: NDArray[np.float64], normals: Vectors) -> Polygons:
-    """Flat, two points a sample, facing along `normals` as far as these are across the curve."""
+    """Flat, two points a sample, facing along `normals` (N, 3) as far as these are across the curve.
+
+    centres (N, 3), radii (N,): in scene units.
+    """
     course = _course(samples, centres)
     sideways = normalize(np.cross(normals, course.tangent))
     facing = np.cross(course.tangent, sideways)

@@ -23,6 +23,7 @@ class Unresolved(NamedTuple):
 
     @property
     def unsupported(self) -> Unsupported:
+        """The same as what a render leaves out."""
         return Unsupported(self.prim, self.reason)
 
 

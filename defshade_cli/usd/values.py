@@ -29,7 +29,7 @@ STANDS_NOWHERE = f"its transform is not finite, or goes beyond {FARTHEST:g}"
 
 
 def within_reach(numbers: NDArray) -> NDArray[np.bool_]:
-    """Which are finite, and no greater than FARTHEST."""
+    """Which (N,) are finite, and no greater than FARTHEST."""
     return np.abs(numbers) <= FARTHEST
 
 
@@ -40,7 +40,7 @@ def is_finite(value: object) -> bool:
 
 
 def are_finite(numbers: NDArray) -> bool:
-    """All numbers of a contiguous array. Their squares' sum tells it at once, unless it overflows."""
+    """Whether a contiguous array (...) is finite. Its squares' sum tells at once, unless that overflows."""
     flat = numbers.ravel()
     return math.isfinite(np.dot(flat, flat)) or bool(np.isfinite(flat).all())
 

@@ -14,12 +14,12 @@ IDENTITY = Gf.Matrix4d(1.0)
 
 
 def matrix(gf: Gf.Matrix4d) -> Matrix:
-    """(4, 4) float64 `b_from_a` of USD's "a to b"."""
+    """(4, 4) float64 `b_from_a` of (4, 4), (4, 4), USD's "a to b"."""
     return np.array(gf, np.float64).T.copy()
 
 
 def gf_matrix(b_from_a: Matrix) -> Gf.Matrix4d:
-    """USD's "a to b"."""
+    """USD's "a to b" of (4, 4)."""
     return Gf.Matrix4d(b_from_a.T.tolist())
 
 

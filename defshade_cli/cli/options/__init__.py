@@ -72,7 +72,10 @@ def _takes(options: list[Function], function: Function) -> Function:
 
 
 def make_job(values: dict[str, Any]) -> RenderJob:
-    """The RenderJob in a command's `values`, which keep only what is the command's own."""
+    """The RenderJob in a command's `values`, which keep only what is the command's own.
+
+    Raises UsageError for options that exclude each other.
+    """
     if values["size"] and values["width"]:
         raise UsageError("--size and --width exclude each other")
     if values["frames"] and values["default_time"]:

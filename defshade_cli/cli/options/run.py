@@ -31,6 +31,7 @@ class Reporting:
 
     @property
     def contained(self) -> bool:
+        """Whether the render goes into a process of its own, which a limit can end."""
         return self.isolate or self.memory_limit is not None or self.timeout is not None
 
 

@@ -26,6 +26,7 @@ def make_spec(film: Film, channels: int, kind: str) -> oiio.ImageSpec:
 
 
 def set_attributes(spec: oiio.ImageSpec, attributes: Iterable[Attribute]) -> None:
+    """Put attributes into a header, each with its type."""
     for name, kind, value in attributes:
         spec.attribute(name, oiio.TypeDesc(kind), value)
 
@@ -44,7 +45,7 @@ def opened(path: Path, specs: Sequence[oiio.ImageSpec]) -> Iterator[oiio.ImageOu
 
 
 def bounded(name: str, pixels: Pixels, *, half: bool) -> Pixels:
-    """The pixels, brought within what half can hold where asked; what is wrong with them goes to the log."""
+    """The pixels (H, W, C), brought within what half can hold where asked; what is wrong with them goes to the log."""
     low, high = pixels.min(), pixels.max()
     if np.isnan(low):
         log.warning("%s: %d values are NaN", name, np.count_nonzero(np.isnan(pixels)))

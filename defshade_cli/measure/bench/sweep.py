@@ -43,6 +43,7 @@ class Sweep:
 
     @property
     def choices(self) -> tuple[Choice, ...]:
+        """All combinations."""
         return tuple(Choice(*values) for values in product(self.layouts, self.samples, self.shadows, self.filters))
 
 

@@ -21,6 +21,7 @@ class Choice:
     filter: Filter
 
     def applied(self, settings: RenderSettings) -> RenderSettings:
+        """The settings with this choice made."""
         return replace(settings, layout=self.layout, samples=self.samples, shadows=self.shadows, filter=self.filter)
 
     def __str__(self) -> str:
@@ -47,4 +48,5 @@ class Trial:
     flip: float | None
 
     def cost(self, of: Cost) -> float:
+        """Seconds, by the clock or of the processor."""
         return self.wall if of == "wall" else self.cpu

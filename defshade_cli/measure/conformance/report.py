@@ -13,6 +13,7 @@ _RULE = "|---|---|---:|---:|---|"
 
 
 def report_of(results: Sequence[Result]) -> dict[str, Any]:
+    """All results with their summary, for JSON."""
     return {
         "version": __version__,
         "least_iou": LEAST_IOU,

@@ -41,10 +41,12 @@ class Result:
         return bool(self.error) or (self.iou is not None and self.iou < LEAST_IOU and not self.remark)
 
     def as_json(self) -> dict[str, Any]:
+        """The fields, for JSON."""
         return asdict(self)
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> Self:
+        """A result as `as_json` gave it."""
         lists = {name: tuple(data[name]) for name in ("unsupported", "warnings")}
         return cls(**data | lists)
 

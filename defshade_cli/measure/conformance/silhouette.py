@@ -33,7 +33,7 @@ def mask_of_color(rgb: NDArray, background: Color) -> Mask:
 
 
 def even_background(rgb: NDArray) -> Color | None:
-    """The colour of all four corners; None where they differ."""
+    """The colour (3,) of all four corners; None where they differ."""
     corners = rgb[[0, 0, -1, -1], [0, -1, 0, -1]].astype(np.float64)
     if (np.abs(corners - corners[0]) > 1.5 * _STEP).any():
         return None

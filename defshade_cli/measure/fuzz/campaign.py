@@ -39,6 +39,7 @@ def _listing(folder: Path, without: Path) -> set[Path]:
 
 
 def verdict(outcome: Outcome, *, strayed: bool) -> str:
+    """One word or two for how a mutant ended; `strayed`: a file was written outside its folder."""
     if strayed:
         return "a file outside"
     if not outcome.error:

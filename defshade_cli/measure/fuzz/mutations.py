@@ -26,6 +26,7 @@ def flipped(data: bytes, rng: Generator) -> bytes:
 
 
 def truncated(data: bytes, rng: Generator) -> bytes:
+    """The data cut off at a random byte."""
     return data[: rng.integers(len(data))]
 
 

@@ -34,6 +34,7 @@ class Corner:
 
 
 def all_corners() -> list[Corner]:
+    """The corners of all families."""
     return [corner for family in _FAMILIES for corner in family()]
 
 

@@ -39,6 +39,7 @@ class StressStage:
     more: str = ""
 
     def text(self) -> str:
+        """The stage, as usda."""
         ops = {name: self._placed(place) for name, place in (("LIGHT_OPS", self.light_at), ("EYE_OPS", self.eye))}
         lights = self.lights.replace("LIGHT_OPS", f"float inputs:radius = {0.2 * self.scale!r}\n{ops['LIGHT_OPS']}")
         near, far = (limit * self.scale for limit in self.clipping)

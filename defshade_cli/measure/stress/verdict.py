@@ -38,6 +38,7 @@ class Verdict:
 
     @property
     def is_sound(self) -> bool:
+        """Whether nothing odd was seen and the error is within bounds, or has its reason."""
         return not self.odd and (self.worst <= BOUND or bool(self.corner.why))
 
 

@@ -27,10 +27,12 @@ class Coordinates(NamedTuple):
     matrix: NDArray[np.float64]
 
     def moved(self, matrix: NDArray[np.float64]) -> Coordinates:
+        """The coordinates after a further matrix (3, 3)."""
         return Coordinates(self.uv, matrix @ self.matrix)
 
     @property
     def affine(self) -> Affine:
+        """The two rows of the matrix that count."""
         first, second = self.matrix[:2].tolist()
         return tuple(first), tuple(second)
 

@@ -55,6 +55,7 @@ class Graph:
         return signal.bias
 
     def text(self, node: UsdShade.Shader, name: str, default: str) -> str:
+        """The value of an input that is a string."""
         return str(self.network.value(node, name, default))
 
     def output(self, output: Usd.Attribute) -> Signal:

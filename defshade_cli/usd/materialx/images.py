@@ -40,14 +40,17 @@ _UV_TEXTURE = _Names("fallback", "wrapS", "wrapT")
 
 
 def image(graph: Graph, node: UsdShade.Shader, _: str, width: int) -> Signal:
+    """MaterialX's `image` and its kin."""
     return _read(graph, node, read_coordinates(graph, node), width)
 
 
 def tiled_image(graph: Graph, node: UsdShade.Shader, _: str, width: int) -> Signal:
+    """MaterialX's `tiledimage`."""
     return _read(graph, node, tiled(graph, node), width)
 
 
 def gltf_image(graph: Graph, node: UsdShade.Shader, _: str, width: int) -> Signal:
+    """MaterialX's `gltf_image` and `gltf_colorimage`: an image times its factor."""
     return _read(graph, node, gltf_placed(graph, node), width) * graph.signal(node, "factor", 1.0)
 
 
@@ -59,6 +62,7 @@ def gltf_color_image(graph: Graph, node: UsdShade.Shader, output: str, width: in
 
 
 def gltf_normal_map(graph: Graph, node: UsdShade.Shader, _: str, width: int) -> Signal:
+    """MaterialX's `gltf_normalmap`: [0, 1] → [-1, 1]."""
     found = _read(graph, node, gltf_placed(graph, node), width, default=(0.5, 0.5, 1.0))
     return found * constant(2.0) - constant(1.0)
 

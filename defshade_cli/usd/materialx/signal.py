@@ -40,10 +40,12 @@ class Signal:
 
     @property
     def is_constant(self) -> bool:
+        """Whether no image is read."""
         return self.lookup is None
 
     @property
     def width(self) -> int:
+        """How many channels it has."""
         return len(self.bias)
 
     def __add__(self, other: Signal) -> Signal:
@@ -89,6 +91,7 @@ class Signal:
 
 
 def constant(values: ArrayLike) -> Signal:
+    """A signal that is the same everywhere; values: a number or (C,)."""
     bias = np.atleast_1d(np.asarray(values, np.float64))
     return Signal(bias, np.zeros_like(bias), (0,) * len(bias))
 
@@ -109,6 +112,7 @@ def joined(signals: Sequence[Signal]) -> Signal:
 
 
 def mixed(background: Signal, foreground: Signal, amount: Signal) -> Signal:
+    """MaterialX's `mix`: background where `amount` is 0, foreground where it is 1."""
     return background * (constant(1.0) - amount) + foreground * amount
 
 

@@ -52,6 +52,7 @@ class Translation:
     lost: dict[str, None] = field(default_factory=dict)
 
     def run(self) -> Translation:
+        """Translate the surface, and note which inputs that matter were left out."""
         self.model.translate(self)
         for name, (neutral, owner) in self.model.left_out.items():
             if self._differs(name, neutral) and (not owner or self._differs(owner, 0.0)):
@@ -59,9 +60,11 @@ class Translation:
         return self
 
     def lose(self, name: str, *reasons: str) -> None:
+        """Note an input that is lost, and why."""
         self.lost[f"{name} ({', '.join(dict.fromkeys(reasons))})" if reasons else name] = None
 
     def authored(self, name: str) -> bool:
+        """Whether the input has a value or a connection."""
         return self.network.source(self.shader, name) is not None
 
     def __getitem__(self, name: str) -> Signal:
@@ -115,6 +118,7 @@ class Translation:
         self.put_product("diffuse_color", weight, name) if weight else self.put("diffuse_color", self[name], name)
 
     def put_occlusion(self) -> None:
+        """Put the occlusion that was found beside the surface, if any."""
         if self.occlusion:
             self.put("occlusion", self["occlusion"], "occlusion")
 

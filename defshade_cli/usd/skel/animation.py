@@ -29,6 +29,7 @@ class Pose:
         return self.joints.tobytes(), self.weights.tobytes()
 
     def without_joints(self) -> Pose:
+        """The pose with its blend shapes alone."""
         return replace(self, joints=self.joints[:0])
 
 
@@ -45,6 +46,7 @@ class Animation:
 
     @property
     def joint_count(self) -> int:
+        """How many joints it moves."""
         return len(self._joints)
 
     def at(self, time: Usd.TimeCode) -> Pose:

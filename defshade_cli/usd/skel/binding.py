@@ -20,7 +20,7 @@ class Rig(NamedTuple):
     in_world: bool
 
     def place(self, skeleton: Usd.Prim, xforms: UsdGeom.XformCache) -> tuple[Gf.Matrix4d, bool]:
-        """Where a skeleton stands in the subtree, and whether that is world space."""
+        """(4, 4) where a skeleton stands in the subtree, and whether that is world space."""
         if not skeleton.GetPath().HasPrefix(self.root.GetPath()):
             return xforms.GetLocalToWorldTransform(skeleton), True
         rig_from_skeleton, resets = xforms.ComputeRelativeTransform(skeleton, self.root)

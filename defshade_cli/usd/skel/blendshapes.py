@@ -41,6 +41,7 @@ class BlendShapes:
     silent: NDArray[np.bool_]
 
     def offsets(self, weights: NDArray[np.float32]) -> Offsets:
+        """What the weights (S,) add to points and normals, (N, 3) each."""
         amounts = self._amounts(weights)
         added = (self.points @ amounts, self.normals @ amounts, self.points @ (amounts * self.silent))
         return Offsets(*(offsets.reshape(-1, 3) for offsets in added))

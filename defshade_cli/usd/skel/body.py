@@ -25,6 +25,7 @@ class Body(NamedTuple):
 
 
 def body_of(surface: Surface) -> Body:
+    """What of the surface bends: its polygons, else points of strands or of copies."""
     if surface.strands is not None:
         strands = surface.strands
         normals = strands.normals if strands.normals and strands.normals.interpolation == "vertex" else None

@@ -150,7 +150,7 @@ def moulded(polygons: Polygons, offsets: Offsets) -> Polygons:
 
 
 def bent(polygons: Polygons, skinning: Skinning, influences: Influences, bind: Matrix) -> Polygons:
-    """Polygons moved from bind to skeleton space; normals that no point has follow from the shape."""
+    """Polygons moved from bind to skeleton space; bind: (4, 4). Normals that no point has follow from the shape."""
     bound = polygons.points @ bind[:3, :3].T + bind[:3, 3]
     moved = replace(polygons, points=skinning.points(bound, influences).astype(np.float32))
     if moved.normals is None:

@@ -38,6 +38,7 @@ class Influences:
         return np.take_along_axis(self.joints, self.weights.argmax(axis=1)[:, None], axis=1)[:, 0]
 
     def with_weights(self, weights: NDArray[np.float64]) -> csr_matrix:
+        """A matrix (N, J) of weights (N, K), which stand at the influences' joints."""
         from scipy.sparse import csr_matrix
 
         count, most = self.joints.shape

@@ -22,7 +22,8 @@ Points = NDArray[np.float64]
 class Skinning(Protocol):
     """Moves the elements that influences are given for."""
 
-    def points(self, points: Points, influences: Influences) -> Points: ...
+    def points(self, points: Points, influences: Influences) -> Points:
+        """The points (N, 3) bent, each by its influences."""
 
     def normals(self, normals: Points, influences: Influences) -> Points:
         """Not of unit length."""
@@ -36,10 +37,12 @@ class LinearBlend:
     joints: NDArray[np.float64]
 
     def points(self, points: Points, influences: Influences) -> Points:
+        """(N, 3) by the blended matrices."""
         blended = _blend(influences, self.joints[:, :3])
         return np.einsum("nij,nj->ni", blended[..., :3], points) + blended[..., 3]
 
     def normals(self, normals: Points, influences: Influences) -> Points:
+        """(N, 3) by the inverse transposes, of any length."""
         return np.einsum("nij,nj->ni", _blend(influences, inverse_transposes(self.joints[:, :3, :3])), normals)
 
 
@@ -54,11 +57,13 @@ class DualQuaternionBlend:
     joints: NDArray[np.float64]
 
     def points(self, points: Points, influences: Influences) -> Points:
+        """(N, 3) by the blended dual quaternions, scaled before."""
         real, dual = self._blended(influences)
         scaled = np.einsum("nij,nj->ni", _blend(influences, self._scales), points) if self._is_scaled else points
         return _rotated(real, scaled) + 2.0 * _imaginary_of_product(dual, real)
 
     def normals(self, normals: Points, influences: Influences) -> Points:
+        """(N, 3) by the blended rotations, and the inverse transposes of scales; of any length."""
         real, _ = self._blended(influences)
         if self._is_scaled:
             normals = np.einsum("nij,nj->ni", _blend(influences, inverse_transposes(self._scales)), normals)

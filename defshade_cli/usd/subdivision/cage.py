@@ -21,7 +21,7 @@ INFINITE = 10.0
 
 
 def decayed(sharpness: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sharpness one level finer."""
+    """Sharpness (E,) or (V,) one level finer."""
     return np.where(sharpness >= INFINITE, sharpness, np.maximum(sharpness - 1.0, 0.0))
 
 
@@ -44,18 +44,22 @@ class Cage:
 
     @property
     def vertex_count(self) -> int:
+        """V."""
         return len(self.vertex_sharpness)
 
     @property
     def edge_count(self) -> int:
+        """E."""
         return len(self.edge_vertices)
 
     @property
     def face_count(self) -> int:
+        """F."""
         return len(self.face_offsets) - 1
 
     @cached_property
     def face_sizes(self) -> Indices:
+        """(F,) corners of each face."""
         return np.diff(self.face_offsets)
 
     @cached_property
@@ -168,6 +172,7 @@ class Cage:
 
 
 def next_in_face(face_offsets: Indices) -> Indices:
+    """(corners,) the corner that follows each around its face; face_offsets: (F + 1,)."""
     following = np.arange(1, face_offsets[-1] + 1, dtype=np.int32)
     following[face_offsets[1:] - 1] = face_offsets[:-1]
     return following

@@ -91,7 +91,7 @@ def limit(cage: Cage) -> Masks:
 
 
 def across(theta: NDArray[np.float64]) -> NDArray[np.float64]:
-    """φ, the weight of the vertices across the quads in the limit tangents, against 1 of the neighbours.
+    """φ (N,), the weight of the vertices across the quads in the limit tangents, against 1 of the neighbours.
 
     The subdominant eigenvalue of a ring whose edges stand θ apart is λ = 1/4 + h/(8φ), h = cos(θ/2), and the vertices
     across weigh (cos iθ + cos (i + 1)θ) / (16λ − 4) = φ cos (i + ½)θ.
@@ -101,7 +101,7 @@ def across(theta: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def sector_weights(theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(inner, bounding) of the tangent that leads into a sector whose edges stand θ apart, the outer two sharp.
+    """(inner, bounding) of the tangent that leads into a sector whose edges stand θ (N,) apart, the outer two sharp.
 
     The left eigenvector to λ, with h and S the cosine and sine of θ/2. Two faces give the B-spline's −1 : 4 : −1.
     """

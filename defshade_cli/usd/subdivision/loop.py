@@ -15,7 +15,7 @@ from defshade_cli.usd.subdivision.stencil import Entries, Masks, assemble
 
 
 def beta(valence: NDArray) -> NDArray[np.float64]:
-    """Loop's weight of each neighbour: (5/8 − (3/8 + cos(2π/n)/4)²)/n."""
+    """Loop's weight (V,) of each neighbour: (5/8 − (3/8 + cos(2π/n)/4)²)/n."""
     return (5 / 8 - (3 / 8 + np.cos(2 * np.pi / valence) / 4) ** 2) / valence
 
 
@@ -55,12 +55,12 @@ def _edge_points(cage: Cage) -> tuple[Entries, Entries]:
 
 
 def across(theta: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Loop's tangents are the cosines and sines of the neighbours alone."""
+    """(N,) zeros: Loop's tangents are the cosines and sines of the neighbours alone."""
     return np.zeros_like(theta)
 
 
 def sector_weights(theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(inner, bounding) of the tangent that leads into a sector whose edges stand θ apart, the outer two sharp.
+    """(inner, bounding) of the tangent that leads into a sector whose edges stand θ (N,) apart, the outer two sharp.
 
     The left eigenvector to λ = 3/8 + cos θ/4, which for three faces is the box spline's −1, 2, 2, −1 over −2. A sector
     of one face has no inner edge; its tangent is the eigenvector to 1/4.

@@ -54,6 +54,7 @@ LINEAR_TRIANGLES = replace(LOOP, refine=bilinear.refine_triangles, limit=_stay, 
 
 
 def scheme_of(topology: Topology) -> Scheme:
+    """The rules that the topology asks for."""
     if topology.scheme == "catmullClark":
         smooth_triangles = topology.triangle_subdivision_rule == "smooth"
         return CATMULL_CLARK_SMOOTH_TRIANGLES if smooth_triangles else CATMULL_CLARK

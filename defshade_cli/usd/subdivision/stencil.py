@@ -34,6 +34,7 @@ def _used(entries: Entries) -> tuple[NDArray, NDArray, NDArray[np.float64]]:
 
 
 def identity(count: int) -> Masks:
+    """The masks (count, count) that change nothing."""
     from scipy import sparse
 
     return sparse.csr_array(sparse.identity(count, format="csr"))
@@ -53,6 +54,7 @@ class Stencils:
         return reduce(lambda finer, mask: mask @ finer, self.masks, np.asarray(values, np.float64))
 
     def then(self, mask: Masks) -> Stencils:
+        """The stencils with one more mask (rows, columns) applied."""
         return Stencils((*self.masks, mask))
 
     @property

@@ -1,0 +1,102 @@
+"""Whatever has a public name says what it is: arrays with their shapes, functions that raise with what they raise."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+import pkgutil
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+import defshade_cli
+from defshade_cli import errors
+
+ARRAYS = re.compile(r"NDArray|Pixels|Matrix|Vector")
+SHAPE = re.compile(r"\([^()]*(\b[A-Z]\b|\b\d\b|\.\.\.|…|height, width)[^()]*\)")
+"""As (N, 3), (H, W, C), (..., 3), (height, width)."""
+
+ERRORS = {name for name, value in vars(errors).items() if inspect.isclass(value) and issubclass(value, Exception)}
+MODULES = [info.name for info in pkgutil.walk_packages(defshade_cli.__path__, "defshade_cli.") if "._" not in info.name]
+
+
+@dataclass(frozen=True)
+class Public:
+    """A function or method: what it is called, its docstring and those around it, which speak for it."""
+
+    name: str
+    function: Callable[..., Any]
+    docstring: str | None
+    around: str
+
+
+def _module(name: str) -> ModuleType:
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        pytest.skip(f"an extra is not installed: {error}")
+
+
+def _own(module: ModuleType) -> Iterator[tuple[str, Any]]:
+    for name, value in vars(module).items():
+        if not name.startswith("_") and getattr(value, "__module__", None) == module.__name__:
+            yield name, value
+
+
+def _functions(module: ModuleType) -> Iterator[Public]:
+    said = module.__doc__ or ""
+    for name, value in _own(module):
+        if inspect.isclass(value):
+            yield from _methods(value, said)
+        elif inspect.isfunction(plain := inspect.unwrap(value)):
+            yield Public(name, plain, inspect.getdoc(value), said)
+
+
+def _methods(owner: type, said: str) -> Iterator[Public]:
+    for name, value in vars(owner).items():
+        plain = getattr(value, "fget", None) or getattr(value, "__func__", None) or getattr(value, "func", value)
+        if not name.startswith("_") and inspect.isfunction(plain):
+            inherited = (inspect.getdoc(getattr(base, name, None)) for base in owner.__mro__[1:] if hasattr(base, name))
+            docstring = inspect.getdoc(value) or next(inherited, None)
+            yield Public(f"{owner.__name__}.{name}", plain, docstring, f"{said} {inspect.getdoc(owner)}")
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_public_names_have_docstrings(name: str) -> None:
+    module = _module(name)
+    lacking = [public.name for public in _functions(module) if not public.docstring]
+    lacking += [name for name, value in _own(module) if inspect.isclass(value) and not inspect.getdoc(value)]
+    assert not lacking, f"{name}: {', '.join(lacking)}"
+    assert module.__doc__ or not Path(str(module.__file__)).stat().st_size, f"{name} has no docstring"
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_arrays_have_shapes(name: str) -> None:
+    """In the function's own docstring, its class's or its module's."""
+    takes_arrays = (f for f in _functions(_module(name)) if ARRAYS.search(str(f.function.__annotations__)))
+    lacking = [public.name for public in takes_arrays if not SHAPE.search(f"{public.docstring} {public.around}")]
+    assert not lacking, f"{name}: {', '.join(lacking)}"
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_errors_are_named(name: str) -> None:
+    """Those of errors.py that a function raises itself."""
+    lacking = {
+        public.name: missing
+        for public in _functions(_module(name))
+        if (missing := [error for error in _raised(public.function) if error not in (public.docstring or "")])
+    }
+    assert not lacking, f"{name}: {lacking}"
+
+
+def _raised(function: Callable[..., Any]) -> set[str]:
+    source = inspect.getsource(function)
+    tree = ast.parse(f"if True:\n{source}" if source.startswith(" ") else source)
+    calls = (node.exc.func for node in ast.walk(tree) if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call))
+    return ERRORS & {call.id for call in calls if isinstance(call, ast.Name)}
