@@ -31,27 +31,30 @@ def shot_files(shot: Shot) -> tuple[Path, ...]:
     return tuple(file for path in shot_paths(shot) for file in targets(layers, shot.job.output, path))
 
 
-def check_outputs(shots: Sequence[Shot]) -> None:
-    """Say before the first of a job's shots what would go wrong after it.
+def check_outputs(shots: Sequence[Shot]) -> list[Path]:
+    """Say before the first of a job's shots what would go wrong after it. Returns the files that they become.
 
     Raises UsageError for names that collide, unknown suffixes, displays and views; OutputError for folders that
     cannot be written.
     """
     frames = len({shot.frame for shot in shots})
-    for pattern in {pattern for shot in shots for pattern in shot.job.output.patterns}:
+    jobs = {shot.product: shot.job for shot in shots}
+    for pattern in {pattern for job in jobs.values() for pattern in job.output.patterns}:
         if frames > 1 and not has_frame_token(pattern):
             raise UsageError(f"{frames} frames would overwrite each other in {pattern}; put #### in its name")
     files = [file for shot in shots for file in shot_files(shot)]
     if len(set(files)) < len(files):
         twice = next(file for file in files if files.count(file) > 1)
         raise UsageError(f"two outputs would be written to {twice}")
-    for job in {shot.product: shot.job for shot in shots}.values():
-        _check_formats(files, job)
+    for job in jobs.values():
+        _check_formats(list({suffix_of(file): file for file in files}.values()), job)
     for folder_file in {file.parent: file for file in files}.values():
         check_writable(folder_file)
+    return files
 
 
 def _check_formats(files: Sequence[Path], job: RenderJob) -> None:
+    """files: one of each suffix."""
     for file in files:
         check_format(file, job.output)
     if any(suffix_of(file) != EXR for file in files):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from defshade_cli.errors import BatchError, UsageError
 from defshade_cli.farm.shots import Shot, make_shot
-from defshade_cli.farm.targets import check_outputs, remove_leftovers, shot_files
+from defshade_cli.farm.targets import check_outputs, remove_leftovers
 from defshade_cli.scene.product import Product
 from defshade_cli.settings import RenderJob
 
@@ -94,9 +94,7 @@ def check_batch(jobs: Sequence[RenderJob]) -> None:
     """
     writers: dict[Path, RenderJob] = {}
     for job in jobs:
-        shots = _expected_shots(job)
-        check_outputs(shots)
-        for file in (file for shot in shots for file in shot_files(shot)):
+        for file in check_outputs(_expected_shots(job)):
             other = writers.setdefault(file, job)
             if other is not job:
                 raise UsageError(f"{other.stage} and {job.stage} would both be written to {file}; put {{scene}} in -o")
@@ -108,13 +106,14 @@ def leaving_no_leftovers(jobs: Sequence[RenderJob]) -> Iterator[None]:
     try:
         yield
     finally:
-        for job in jobs:
-            remove_leftovers(_expected_shots(job))
+        remove_leftovers([shot for job in jobs for shot in _expected_shots(job)])
 
 
 def _expected_shots(job: RenderJob) -> list[Shot]:
     """The shots of a stage that is not open yet: its first frame, its cameras and its products are its own to know."""
-    return [make_shot(job, frame, Product(), job.camera or "camera") for frame in job.frames or (0.0,)]
+    first, *others = job.frames or (0.0,)
+    shot = make_shot(job, first, Product(), job.camera or "camera")
+    return [shot, *(replace(shot, frame=frame) for frame in others)]
 
 
 def _parts(job: RenderJob, size: int) -> Iterator[RenderJob]:

@@ -15,7 +15,7 @@ import socket
 import tempfile
 import threading
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 from defshade_cli.errors import OutputError
@@ -84,11 +84,14 @@ def remove_abandoned(folder: Path) -> None:
 
     Raises OutputError.
     """
-    name = re.compile(rf"{re.escape(_hidden_prefix())}(\d+)-[0-9a-f]+\.\w+")
+    prefix = _hidden_prefix()
+    name = re.compile(rf"{re.escape(prefix)}(\d+)-[0-9a-f]+\.\w+")
     try:
-        for path in folder.iterdir() if folder.is_dir() else ():
-            if (match := name.fullmatch(path.name)) and not _is_alive(int(match[1])):
-                path.unlink(missing_ok=True)
+        with os.scandir(folder) if folder.is_dir() else nullcontext(()) as entries:
+            hidden = [entry.name for entry in entries if entry.name.startswith(prefix)]
+        for file in hidden:
+            if (match := name.fullmatch(file)) and not _is_alive(int(match[1])):
+                (folder / file).unlink(missing_ok=True)
     except OSError as error:
         raise OutputError(f"{folder}: {_reason(error)}") from error
 
