@@ -79,7 +79,8 @@ def tools(size: tuple[int, int], python: str) -> list[Tool]:
         Tool("F3D", peer("f3d"), ".glb", module="f3d", leaves_out=falloff),
         Tool("pyrender", peer("pyrender"), ".glb", module="pyrender", leaves_out="shadows, areas, lights past 4, USD"),
         Tool("Mitsuba `direct`, 16 spp", peer("mitsuba", "16", runs=sys.executable), image=".exr", module="mitsuba"),
-        Tool("Cycles, 16 samples, direct", peer("bpy", "16"), image=".exr", module="bpy"),
+        Tool("Cycles, 16 samples, direct", peer("bpy", "16", "cycles"), image=".exr", module="bpy"),
+        Tool("EEVEE, 16 samples", peer("bpy", "16", "eevee"), image=".exr", module="bpy"),
     ]
     return [tool for tool in known if not tool.module or _imports(tool, python)]
 
