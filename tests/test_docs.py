@@ -10,18 +10,18 @@ from pathlib import Path
 import click
 import pytest
 
-from defshade_cli.cli import defshade
+from defshade_cli import cli
 from defshade_cli.cli.reference import reference
 from defshade_cli.image.layers import LAYERS
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "shaders").rglob("*.md")])
-COMMANDS = sorted(defshade.commands)
+COMMANDS = sorted(cli.COMMANDS)
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_command_and_options_have_help(name: str) -> None:
-    command = defshade.commands[name]
+    command = cli.command_of(name)
     assert command.help, f"defshade {name} needs a docstring"
     assert "Examples:" in (command.epilog or ""), f"defshade {name} needs examples in its epilog"
     options = [param for param in command.params if isinstance(param, click.Option)]
@@ -67,7 +67,7 @@ def _is_usage(line: str) -> bool:
 )
 def test_shown_command_parses(page: str, line: str) -> None:
     arguments = shlex.split(line)[1:]
-    command = defshade.commands.get(arguments[0])
+    command = cli.command_of(arguments[0]) if arguments[0] in COMMANDS else None
     assert command is not None, f"{page} shows {line!r}, and there is no such command"
     if len(arguments) > 1:
         with command.make_context(arguments[0], arguments[1:]) as context:

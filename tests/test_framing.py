@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
-from defshade_cli.cli import defshade
+from defshade_cli.cli import command_of, defshade
 from defshade_cli.cli.arguments import option_arguments
 from defshade_cli.farm.open_job import OpenJob
 from defshade_cli.scene.camera import Camera
@@ -97,8 +97,8 @@ def test_a_job_of_a_turn_has_its_frames() -> None:
 
 def test_the_options_of_a_turn_survive_the_way_to_a_farm(scenes: Path) -> None:
     job = RenderJob(scenes / "gprims.usda", settings=RenderSettings(turntable=3, direction=(10.0, -5.0), studio=True))
-    typed = option_arguments(job, defshade.commands["render"].params)
-    with defshade.commands["render"].make_context("render", ["a.usda", *typed]) as context:
+    typed = option_arguments(job, command_of("render").params)
+    with command_of("render").make_context("render", ["a.usda", *typed]) as context:
         assert context.params["turntable"] == 3
         assert context.params["direction"] == (10.0, -5.0)
         assert context.params["studio"]

@@ -7,27 +7,22 @@
     reference  docs/commands.md, from the commands themselves
 
 A command builds a job, calls one function and prints: results to stdout; progress, logs and errors to stderr.
-What loads a driver or a foreign library is imported inside the command that needs it, so `--help` is quick.
+A command is imported when it is called for, and a driver or a foreign library by the command that needs it.
 """
 
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 
 import click
 
 from defshade_cli import __version__
-from defshade_cli.cli.batch import batch
-from defshade_cli.cli.bench import bench
-from defshade_cli.cli.compare import compare
-from defshade_cli.cli.doctor import doctor
-from defshade_cli.cli.gbuffer import gbuffer
-from defshade_cli.cli.inspect import inspect
-from defshade_cli.cli.render import render
-from defshade_cli.cli.view import view
 from defshade_cli.errors import DefshadeError, UsageError
 
 INTERRUPTED = 130  # 128 + SIGINT, as shells have it
+
+COMMANDS = ("render", "gbuffer", "batch", "inspect", "bench", "compare", "view", "doctor")
 
 _HELP = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
 _CODES = """\b
@@ -35,7 +30,23 @@ Exit codes: 0 done, 1 compare over the threshold, 2 usage, 3 the stage, 4 the GP
 6 some frames of a batch failed, 130 interrupted, 143 terminated."""
 
 
-@click.group(context_settings=_HELP, epilog=_CODES, invoke_without_command=True)
+def command_of(name: str) -> click.Command:
+    """One of COMMANDS, from the module of its name."""
+    command: click.Command = getattr(import_module(f"{__name__}.{name}"), name)
+    return command
+
+
+class _Group(click.Group):
+    """Imports none of its commands but the one that is called for."""
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, context: click.Context, name: str) -> click.Command | None:
+        return command_of(name) if name in COMMANDS else None
+
+
+@click.group(cls=_Group, context_settings=_HELP, epilog=_CODES, invoke_without_command=True)
 @click.version_option(__version__, prog_name="defshade")
 @click.pass_context
 def defshade(context: click.Context) -> None:
@@ -46,10 +57,6 @@ def defshade(context: click.Context) -> None:
     if context.invoked_subcommand is None:
         click.echo(context.get_help(), err=True)
         context.exit(UsageError.exit_code)
-
-
-for command in (render, gbuffer, batch, inspect, bench, compare, view, doctor):
-    defshade.add_command(command)
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import click
 
-from defshade_cli.cli import defshade
+from defshade_cli.cli import COMMANDS, command_of
 
 _INTRODUCTION = """\
 # Commands
@@ -21,7 +21,7 @@ Results go to stdout, progress and errors to stderr. An error is one sentence; t
 
 def reference() -> str:
     """The whole page, Markdown."""
-    return "\n".join([_INTRODUCTION, *(_section(defshade.commands[name]) for name in sorted(defshade.commands))])
+    return "\n".join([_INTRODUCTION, *(_section(command) for command in map(command_of, sorted(COMMANDS)))])
 
 
 def _section(command: click.Command) -> str:
