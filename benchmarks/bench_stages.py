@@ -132,7 +132,7 @@ def _ball(rings: int, radius: float, seed: int) -> tuple[NDArray, NDArray]:
     dent = 1.0 + 1e-3 * np.sin(3.0 * theta + seed)
     corner = (np.arange(rings)[:, None] * (rings + 1) + np.arange(rings)).ravel()
     quads = np.stack([corner, corner + rings + 1, corner + rings + 2, corner + 1], axis=1)
-    return (unit * dent[..., None] * radius).reshape(-1, 3), quads[:, ::-1]
+    return (unit * dent[..., None] * radius).reshape(-1, 3), quads
 
 
 def _plane(stage: Usd.Stage, half: float) -> None:

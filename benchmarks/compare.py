@@ -166,6 +166,7 @@ def main() -> None:
     parser.add_argument("--python", default=sys.executable)
     parser.add_argument("--only", default="", help="tools whose names hold one of these, with commas between")
     parser.add_argument("--page", type=Path, help="write the table into this page in place of printing it")
+    parser.add_argument("--block", default="peers", help="the page's block that the table replaces")
     asked = parser.parse_args()
     width, height = map(int, asked.size.split("x"))
     names = [name for name in asked.stages.split(",") if name in GENERATED]
@@ -176,7 +177,7 @@ def main() -> None:
     note = f"{width}x{height}, {asked.rounds} rounds, {os.cpu_count()} cores of {platform.machine()}, load {load:.0f}."
     content = f"{note}\n\n{table(results, chosen)}"
     if asked.page:
-        asked.page.write_text(replace_generated(asked.page.read_text("utf-8"), "peers", content), "utf-8")
+        asked.page.write_text(replace_generated(asked.page.read_text("utf-8"), asked.block, content), "utf-8")
     else:
         print(content)
 
