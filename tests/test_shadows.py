@@ -256,3 +256,14 @@ def test_shadows_are_as_large_as_they_should_be(pipeline: Pipeline, slant: tuple
 def test_a_point_stays_a_point() -> None:
     lamp = replace(bulb(0, 0, 1), treat_as_point=True)
     np.testing.assert_array_equal(emitter_at(lamp, (0.3, 0.8, 0.1), np.zeros(3)).position, far_field(lamp).position)
+
+
+def test_as_many_spots_as_there_are_cast_their_shadows(pipeline: Pipeline) -> None:
+    """More single maps than a block of the shaders holds: the sum is that of spots drawn a few at a time."""
+    x, y = (0.02 * np.stack(np.divmod(np.arange(400), 20)) - 0.2).tolist()
+    spots = [bulb(*place, 3.0, intensity=0.1, cone=20.0) for place in zip(x, y, strict=True)]
+    of = above_wall(spots[0], 0.4, 0.5)
+    apart = [render(pipeline, replace(of, lights=tuple(spots[k : k + 100]))) for k in range(0, 400, 100)]
+    together = render(pipeline, replace(of, lights=tuple(spots)))
+    assert np.median(np.abs(together - sum(apart)) / together.max()) < 1e-3
+    assert np.abs(together - sum(apart)).mean() < 0.01 * together.mean()

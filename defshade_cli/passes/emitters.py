@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.image.environment import sky_of
 from defshade_cli.passes.sampling import Sample, samples
-from defshade_cli.passes.shadow_atlas import atlas_capacity
+from defshade_cli.passes.shadow_atlas import AtlasRoom
 from defshade_cli.passes.shadow_cameras import ShadowExtent, shadow_cameras
 from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.plan.shadow_maps import DOME_DIRECTIONS
@@ -37,17 +37,16 @@ class LitSample:
 def light_batches(scene: Scene, plan: Plan, sample: Sample) -> Iterator[list[LitSample]]:
     """All of the plan's lights in order, in runs whose shadow maps fit the atlas together."""
     extent = shadow_extent(scene.bounds - plan.camera.position, plan)
-    capacity = atlas_capacity(plan.shadow_resolution)
     batch: list[LitSample] = []
-    used = 0
+    room = AtlasRoom(plan.shadow_resolution)
     for number, planned in enumerate(plan.lights):
         for emitter in _emitters(number, planned, plan, sample, extent):
             lit = _lit_sample(planned, emitter, plan, extent)
-            if used + len(lit.shadow_cameras) > capacity:
+            if not room.holds(len(lit.shadow_cameras)):
                 yield batch
-                batch, used = [], 0
+                batch, room = [], AtlasRoom(plan.shadow_resolution)
             batch.append(lit)
-            used += len(lit.shadow_cameras)
+            room.take(len(lit.shadow_cameras))
     if batch:
         yield batch
 

@@ -32,9 +32,19 @@ _TOWARDS_LIGHT = 0.02
 """Of a texel, that receivers count as nearer: clears float32 rounding."""
 
 
-def atlas_capacity(resolution: int) -> int:
-    """Maps that one atlas holds."""
-    return min((ATLAS // resolution) ** 2, _MOST_RECORDS * CUBE_FACES)
+class AtlasRoom:
+    """What an atlas of maps of `resolution` texels a side still holds: slots, and records of single maps."""
+
+    def __init__(self, resolution: int) -> None:
+        self._slots, self._records = (ATLAS // resolution) ** 2, _MOST_RECORDS
+
+    def holds(self, maps: int) -> bool:
+        """A light with as many maps?"""
+        return maps <= self._slots and (maps != 1 or self._records > 0)
+
+    def take(self, maps: int) -> None:
+        self._slots -= maps
+        self._records -= maps == 1
 
 
 def viewport(slot: int, resolution: int) -> tuple[int, int, int, int]:

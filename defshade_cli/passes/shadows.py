@@ -21,7 +21,6 @@ from defshade_cli.passes.culling import CommandBuffer, may_see
 from defshade_cli.passes.shadow_atlas import (
     ATLAS,
     ShadowAtlas,
-    atlas_capacity,
     clip_from_relative,
     cube_uniforms,
     map_records,
@@ -87,7 +86,6 @@ class ShadowPass:
         count = np.array([len(light) for light in cameras], np.uint32)
         first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.uint32)
         maps = placed(cameras, resolution, jitter)
-        assert len(maps) <= atlas_capacity(resolution)
         self._framebuffer.use()
         if maps:
             columns = min(len(maps), ATLAS // resolution)
