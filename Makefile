@@ -3,7 +3,9 @@
 #   make demo    render scenes/showcase.usda to out/
 #   make test    run the tests
 #   make lint    ruff and mypy
-#   make docs    write docs/commands.md anew from the commands
+#   make check   lint, and the tests that draw nothing: before each commit
+#   make coverage  run the tests and say which lines they miss, also in build/coverage
+#   make docs    write docs/commands.md anew from the commands, and build the site into build/site
 #   make tables  measure the layouts anew, for the table in docs/lighting.md
 #   make bench-reading  measure what reading a stage costs
 #   make bench   measure whole processes, ours and peers' in PEERS_PYTHON, into docs/performance.md
@@ -17,14 +19,15 @@
 #   make bench-farm  frames a second by the number of workers
 #   make farm-check  a batch of a thousand frames while workers die and the disk fills
 #   make gallery  render the documents' figures into docs/images
-#   make wheel   build dist/*.whl
+#   make wheel   build dist/*.whl and dist/*.tar.gz
+#   make image   build the container image defshade, which renders without a GPU
 #   make clean   remove what was built, the virtual environment too
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := demo
-.PHONY: demo test lint docs tables bench bench-reading bench-farm accuracy error-check stress conformance gallery
+.PHONY: demo test lint check coverage image docs tables bench bench-reading bench-farm accuracy error-check stress conformance gallery
 .PHONY: fuzz kill-check farm-check wheel clean
 
 PYTHON ?= python3
@@ -53,13 +56,21 @@ demo: .venv/.ready
 test: .venv/.ready-dev
 	$(BIN)/pytest -q
 
+check: lint
+	$(BIN)/pytest -q -m "not slow and not renders"
+
+coverage: .venv/.ready-dev
+	$(BIN)/pytest -q --cov --cov-report=term:skip-covered --cov-report=html:build/coverage
+
 lint: .venv/.ready-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-docs: .venv/.ready
+docs: .venv/.ready-docs
 	$(BIN)/python -m defshade_cli.cli.reference > docs/commands.md
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict
+	echo "defshade: the documents are build/site/index.html"
 
 bench-reading: .venv/.ready
 	$(BIN)/python benchmarks/reading.py
@@ -103,9 +114,12 @@ tables: .venv/.ready
 gallery: .venv/.ready
 	$(BIN)/python -m defshade_cli.measure.gallery docs/images
 
-wheel: .venv/.ready
-	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
-	ls dist/*.whl
+wheel: .venv/.ready-dev
+	$(BIN)/python -m build --outdir dist . >/dev/null
+	ls dist/*.whl dist/*.tar.gz
+
+image:
+	docker build --tag defshade .
 
 clean:
 	rm -rf .venv out dist build .pytest_cache .ruff_cache .mypy_cache .hypothesis
@@ -119,6 +133,10 @@ clean:
 
 .venv/.ready-dev: .venv/.ready
 	$(BIN)/pip install --quiet --editable '.[dev]'
+	touch $@
+
+.venv/.ready-docs: .venv/.ready
+	$(BIN)/pip install --quiet --editable '.[docs]'
 	touch $@
 
 .venv/.ready-reference: .venv/.ready

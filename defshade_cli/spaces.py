@@ -14,7 +14,7 @@ Matrices are named `b_from_a`, act on column vectors (`p_b = b_from_a @ p_a`) an
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,31 +25,31 @@ Window = tuple[float, float, float, float]
 ConformPolicy = Literal["expandAperture", "cropAperture", "adjustApertureWidth", "adjustApertureHeight"]
 
 
-def translation(offset: NDArray) -> Matrix:
+def translation(offset: NDArray[Any]) -> Matrix:
     """(4, 4) matrix that adds `offset` (3,)."""
     matrix = np.eye(4)
     matrix[:3, 3] = offset
     return matrix
 
 
-def cross(a: NDArray, b: NDArray) -> NDArray:
+def cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
     """Cross products of vectors (..., 3). np.cross takes ten times as long for a few."""
     x, y, z = a[..., 0], a[..., 1], a[..., 2]
     u, v, w = b[..., 0], b[..., 1], b[..., 2]
     return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
 
 
-def transform_points(b_from_a: Matrix, points: NDArray) -> NDArray[np.float64]:
+def transform_points(b_from_a: Matrix, points: NDArray[Any]) -> NDArray[np.float64]:
     """Points (..., 3) of frame a in frame b; affine matrices only."""
     return points @ b_from_a[:3, :3].T + b_from_a[:3, 3]
 
 
-def transform_directions(b_from_a: Matrix, directions: NDArray) -> NDArray[np.float64]:
+def transform_directions(b_from_a: Matrix, directions: NDArray[Any]) -> NDArray[np.float64]:
     """Directions (..., 3), not renormalised."""
     return directions @ b_from_a[:3, :3].T
 
 
-def normalize(vectors: NDArray) -> NDArray:
+def normalize(vectors: NDArray[Any]) -> NDArray[Any]:
     """Unit vectors (..., 3) of the same dtype; a zero vector stays zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
@@ -65,7 +65,7 @@ def rigid(matrix: Matrix) -> Matrix:
     return result
 
 
-def cofactors(matrix: NDArray) -> NDArray[np.float64]:
+def cofactors(matrix: NDArray[Any]) -> NDArray[np.float64]:
     """det(M) M⁻ᵀ, with the sign that keeps outward normals outward under a mirror."""
     x, y, z = matrix.T
     areas = np.column_stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])
@@ -86,7 +86,7 @@ def is_similarity(matrix: Matrix) -> bool:
     return bool(scales[0] - scales[2] <= 1e-5 * scales[0])
 
 
-def frame_along(direction: NDArray) -> NDArray[np.float64]:
+def frame_along(direction: NDArray[Any]) -> NDArray[np.float64]:
     """(3, 3) a rotation whose third column points along `direction` (3,); +Z for a zero vector.
 
     In plain floats: shadow maps ask for tens of frames a sample, and NumPy takes ten times as long for three numbers.

@@ -17,6 +17,16 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parent.parent
 
+RENDERERS = {"CliRunner", "Renderer", "render", "run", "subprocess"}
+"""Names that a test file imports when it renders frames or starts processes."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Function]) -> None:
+    """Mark what takes most of the time, which `make check` leaves to `make test`."""
+    for item in items:
+        if "gpu" in item.fixturenames or RENDERERS & vars(item.module).keys():
+            item.add_marker("renders")
+
 
 @pytest.fixture(scope="session")
 def assets() -> Path:

@@ -152,7 +152,7 @@ def test_every_instance_of_curves_is_seen_from_its_own_side() -> None:
 # How OpenGL cuts a fraction of pieces
 
 
-@given(st.lists(st.floats(1.0, 39.0), min_size=1, max_size=5))
+@given(st.lists(st.floats(1.0, 39.0, width=32), min_size=1, max_size=5))
 def test_pieces_are_the_next_odd_number_and_all_but_two_of_one_length(levels: list[float]) -> None:
     row, places = fractional_odd(np.array(levels))
     for edge, level in enumerate(levels):

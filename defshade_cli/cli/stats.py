@@ -83,7 +83,7 @@ def _image_figures(image: ImageResult) -> dict[str, Any]:
     return figures | {"decisions": image.plan.decisions if image.plan else ()}
 
 
-def _layer_figures(pixels: NDArray) -> dict[str, Any]:
+def _layer_figures(pixels: NDArray[Any]) -> dict[str, Any]:
     """Least, greatest and mean of each channel over its finite values, and the share of finite values."""
     import numpy as np
 

@@ -49,7 +49,7 @@ class DaskEngine:
     ) -> None:
         self._remote, self._resources = scheduler is not None, resources or None
         self._arguments = (1 if scheduler else max(1, core_count() // workers), command, log_level)
-        self._pending: dict[str, tuple[Future, Chunk]] = {}
+        self._pending: dict[str, tuple[Future[Any], Chunk]] = {}
         with ExitStack() as stack:
             self._client = _connected(stack, scheduler, workers, self._resources)
             self._stack = stack.pop_all()
@@ -84,7 +84,7 @@ class DaskEngine:
             _, chunk = self._pending.pop(str(future.key))
             yield from future.result() if future.status == "finished" else self._lost(chunk, future)
 
-    def _lost(self, chunk: Chunk, future: Future) -> Iterator[Outcome]:
+    def _lost(self, chunk: Chunk, future: Future[Any]) -> Iterator[Outcome]:
         """Of a chunk that brought down several workers the frames apart, until the one to blame stands alone."""
         tasks = chunk.split()
         if len(tasks) == 1:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from types import MappingProxyType
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -50,7 +51,7 @@ class RecordBuffer:
         self._buffers = [gpu.keep(gpu.context.buffer(reserve=256)) for _ in range(_TURNS if gpu.is_software else 1)]
         self._turn = 0
 
-    def write(self, records: NDArray) -> None:
+    def write(self, records: NDArray[Any]) -> None:
         """Upload `records` (N,) and bind the buffer."""
         if self._gpu.is_software and self._turn == 0:
             self._gpu.context.finish()
@@ -73,20 +74,20 @@ class DrawList:
     many_uvs: vertices hold UV_SETS sets of texture coordinates, not FEW_UV_SETS.
     """
 
-    vertices: tuple[tuple, ...]
+    vertices: tuple[tuple[Any, ...], ...]
     indices: moderngl.Buffer
-    table: NDArray
+    table: NDArray[Any]
     thin: NDArray[np.bool_]
     corners: NDArray[np.float64]
     color_varies: bool
     textures: TextureSet
     many_uvs: bool
 
-    def vertices_of(self, program: moderngl.Program) -> list[tuple]:
+    def vertices_of(self, program: moderngl.Program) -> list[tuple[Any, ...]]:
         """Those of `vertices` that the program reads."""
         return [part for part in self.vertices if any(name in program for name in part[2:])]
 
-    def runs(self, seen: NDArray[np.bool_]) -> tuple[NDArray, NDArray]:
+    def runs(self, seen: NDArray[np.bool_]) -> tuple[NDArray[Any], NDArray[Any]]:
         """Of the (C,) commands that are seen, the solid ones and the thin ones."""
         return self.table[seen & ~self.thin], self.table[seen & self.thin]
 
@@ -107,7 +108,7 @@ class GpuScene:
         self._tiles = RecordBuffer(gpu, TILES)
         self._textures = TextureStore(gpu)
         self._meshes: tuple[Mesh, ...] = ()
-        self._made_for: tuple = ()
+        self._made_for: tuple[Any, ...] = ()
         self._pool: list[moderngl.Buffer] = []
         self._draws: list[moderngl.Buffer] = []
         self._moved: list[moderngl.Buffer] = []
@@ -182,7 +183,7 @@ class GpuScene:
             self._tiles.write(textures.tiles)
         return textures
 
-    def _overwrite(self, meshes: tuple[Mesh, ...], arrays_of: Callable[[int], Sequence[NDArray]]) -> None:
+    def _overwrite(self, meshes: tuple[Mesh, ...], arrays_of: Callable[[int], Sequence[NDArray[Any]]]) -> None:
         """Upload the meshes that are not the same as before, each to its place in the pool."""
         firsts = _first_rows(meshes)
         for number, (old, new) in enumerate(zip(self._meshes, meshes, strict=True)):
@@ -191,13 +192,13 @@ class GpuScene:
                     row = firsts[number, 1 if kind == INDICES_IN_POOL else 0]
                     buffer.write(np.ascontiguousarray(array), offset=int(row) * array[:1].nbytes)
 
-    def _replaced(self, old: list[moderngl.Buffer], arrays: Sequence[NDArray]) -> list[moderngl.Buffer]:
+    def _replaced(self, old: list[moderngl.Buffer], arrays: Sequence[NDArray[Any]]) -> list[moderngl.Buffer]:
         for buffer in old:
             buffer.release()
         return [self._gpu.context.buffer(np.ascontiguousarray(a).tobytes() or bytes(4)) for a in arrays]
 
 
-def instance_records(drawables: Sequence[Drawable], eye: NDArray[np.float64]) -> NDArray:
+def instance_records(drawables: Sequence[Drawable], eye: NDArray[np.float64]) -> NDArray[Any]:
     """One Instance record a placement (P,), in the drawables' order; differences taken in float64."""
     if not drawables:
         return np.zeros(0, record("Instance"))
@@ -227,7 +228,7 @@ def _normal_matrices(linear: NDArray[np.float64]) -> tuple[NDArray[np.float64], 
     return cofactors * (handedness / size)[:, None, None], handedness
 
 
-def material_records(materials: Sequence[Material], input_counts: Sequence[int]) -> NDArray:
+def material_records(materials: Sequence[Material], input_counts: Sequence[int]) -> NDArray[Any]:
     """One Material record each, (M,); fields of the same name are copied. input_counts: texture inputs of each."""
     dtype = record("Material")
     records = np.zeros(len(materials), dtype)
@@ -238,7 +239,7 @@ def material_records(materials: Sequence[Material], input_counts: Sequence[int])
     return records
 
 
-def draw_commands(drawables: Sequence[Drawable], meshes: Sequence[Mesh]) -> tuple[NDArray, NDArray[np.uint32]]:
+def draw_commands(drawables: Sequence[Drawable], meshes: Sequence[Mesh]) -> tuple[NDArray[Any], NDArray[np.uint32]]:
     """Indirect commands (S,), one a subset, and the rows (R, 2), instance and material, that they point into."""
     base_vertex, base_index = (_first_rows(meshes) * (1, 3)).T
     commands, rows, first_instance, first_row = [], [], 0, 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -23,7 +24,7 @@ class Target:
     textures: dict[str, moderngl.Texture]
     depth: moderngl.Texture | None
 
-    def read(self, name: str) -> NDArray:
+    def read(self, name: str) -> NDArray[Any]:
         """(height, width, components) in the texture's own type, row 0 at the top; uint8 for 8-bit planes."""
         texture = self.textures[name]
         return _as_image(texture, _READ_DTYPE[texture.dtype], texture.components)
@@ -66,6 +67,6 @@ def allocate(
     return Target(framebuffer, textures, depth)
 
 
-def _as_image(texture: moderngl.Texture, dtype: type, components: int) -> NDArray:
+def _as_image(texture: moderngl.Texture, dtype: type, components: int) -> NDArray[Any]:
     width, height = texture.size
     return np.frombuffer(texture.read(alignment=1), dtype).reshape(height, width, components)

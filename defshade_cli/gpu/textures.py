@@ -11,6 +11,7 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -36,7 +37,7 @@ class TextureSet:
     """arrays: one a group.  tiles: Tile records.  places: (first tile, tiles, wrap s, wrap t) of what could be read."""
 
     arrays: tuple[moderngl.TextureArray, ...] = ()
-    tiles: NDArray = field(default_factory=lambda: np.zeros(0, record("Tile")))
+    tiles: NDArray[Any] = field(default_factory=lambda: np.zeros(0, record("Tile")))
     places: Mapping[Texture, tuple[int, int, int, int]] = field(default_factory=dict)
 
     def bind(self, program: moderngl.Program) -> None:
@@ -103,7 +104,7 @@ class TextureStore:
 def group_images(images: Images, limit: int) -> list[dict[Source, TexelImage]]:
     """Images of one size and format together, in at most `limit` groups: resized as little as that takes."""
     for fit in _FITS:
-        groups: dict[tuple, dict[Source, TexelImage]] = defaultdict(dict)
+        groups: dict[tuple[Any, ...], dict[Source, TexelImage]] = defaultdict(dict)
         for source, image in images.items():
             size = fit(image.texels.shape[1::-1])
             groups[size, image.texels.shape[2], image.texels.dtype, image.srgb][source] = image
@@ -131,9 +132,9 @@ _FITS: tuple[Callable[[Size], Size], ...] = (lambda size: size, _powers_of_two, 
 
 def place_tiles(
     textures: Sequence[Texture], rows: Mapping[Source, tuple[Size, int, int]], images: Images
-) -> tuple[NDArray, dict[Texture, tuple[int, int, int, int]]]:
+) -> tuple[NDArray[Any], dict[Texture, tuple[int, int, int, int]]]:
     """Tile records (N,), dense by UDIM number, and where each texture that has any tile finds its own."""
-    records: list[NDArray] = []
+    records: list[NDArray[Any]] = []
     places, first = {}, 0
     for texture in textures:
         found = {number: Source(file, texture.color_space) for number, file in texture.tiles}
@@ -162,7 +163,7 @@ def _wraps(texture: Texture, image: TexelImage) -> tuple[int, int]:
 
 def input_records(
     materials: Sequence[Material], found: TextureSet, slots: Mapping[str, int]
-) -> tuple[NDArray, list[int]]:
+) -> tuple[NDArray[Any], list[int]]:
     """TextureInput records (N,), material by material, and how many each has.  slots: see gpu.vertices.uv_slots."""
     usable = [
         [(name, i) for name, i in m.inputs.items() if i.texture in found.places and (i.uv in slots or not i.uv)]
@@ -177,7 +178,7 @@ def input_records(
     return records, [len(inputs) for inputs in usable]
 
 
-def _fill(row: NDArray, name: str, texture_input: TextureInput, uv: int, found: TextureSet) -> None:
+def _fill(row: NDArray[Any], name: str, texture_input: TextureInput, uv: int, found: TextureSet) -> None:
     (a, b, x), (c, d, y) = texture_input.texture_from_uv
     row["scale"], row["bias"] = texture_input.scale, texture_input.bias
     row["texture_from_uv"], row["texture_offset"] = (a, c, b, d), (x, y)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +65,7 @@ def vertex_arrays(
     textured: bool,
     layer_uv: bool = False,
     primvars: Sequence[str] = (),
-) -> list[NDArray]:
+) -> list[NDArray[Any]]:
     """Positions (V, 3), normals (V, 3), indices (T, 3); colours (V, 3) and coordinates (V, 2) where asked for."""
     arrays = [
         _joined([m.points for m in meshes], 3),
@@ -83,7 +84,7 @@ def vertex_arrays(
     return arrays
 
 
-def _joined(arrays: Sequence[NDArray], width: int, dtype: type = np.float32) -> NDArray:
+def _joined(arrays: Sequence[NDArray[Any]], width: int, dtype: type = np.float32) -> NDArray[Any]:
     """One below the other; a scene may have none."""
     return np.concatenate([np.empty((0, width), dtype), *arrays])
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import inf, log10, sqrt
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from defshade_cli.image.layers import BEAUTY, LAYERS
 from defshade_cli.image.perception import delta_e, flip_map
 from defshade_cli.image.reading import read
 
-Image = Path | NDArray | Mapping[str, NDArray]
+Image = Path | NDArray[Any] | Mapping[str, NDArray[Any]]
 """A file, the pixels (H, W, C) of a beauty, or layers by name."""
 
 REL_MSE_EPSILON = 1e-2
@@ -85,11 +86,11 @@ def is_picture(image: Image) -> bool:
     return isinstance(image, Path) and image.suffix.lower() != ".exr"
 
 
-def _mean(values: NDArray | None) -> float | None:
+def _mean(values: NDArray[Any] | None) -> float | None:
     return None if values is None else float(values.mean())
 
 
-def difference(a: NDArray, b: NDArray) -> Pixels:
+def difference(a: NDArray[Any], b: NDArray[Any]) -> Pixels:
     """|a − b| (H, W, C); 0 where both hold the same infinity or NaN, inf where one alone does."""
     a, b = np.asarray(a, np.float32), np.asarray(b, np.float32)
     with np.errstate(invalid="ignore"):
@@ -100,13 +101,15 @@ def difference(a: NDArray, b: NDArray) -> Pixels:
     return apart
 
 
-def _layers_of(image: Image) -> Mapping[str, NDArray]:
+def _layers_of(image: Image) -> Mapping[str, NDArray[Any]]:
     if isinstance(image, Path):
         return read(image)
     return image if isinstance(image, Mapping) else {BEAUTY: np.asarray(image)}
 
 
-def _paired(name: str, first: Mapping[str, NDArray], second: Mapping[str, NDArray]) -> tuple[NDArray, NDArray]:
+def _paired(
+    name: str, first: Mapping[str, NDArray[Any]], second: Mapping[str, NDArray[Any]]
+) -> tuple[NDArray[Any], NDArray[Any]]:
     """Both images' pixels, cut to the channels that both have: an opaque picture may lack alpha."""
     for layers in (first, second):
         if name not in layers:
@@ -118,7 +121,7 @@ def _paired(name: str, first: Mapping[str, NDArray], second: Mapping[str, NDArra
     return a[..., :channels], b[..., :channels]
 
 
-def _compare(name: str, a: NDArray, b: NDArray, flip: float | None, delta_e: float | None) -> Comparison:
+def _compare(name: str, a: NDArray[Any], b: NDArray[Any], flip: float | None, delta_e: float | None) -> Comparison:
     apart = difference(a, b)
     odd_a, odd_b = ~np.isfinite(a), ~np.isfinite(b)
     both = ~(odd_a | odd_b)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
@@ -120,7 +121,7 @@ def _ball() -> Pixels:
     return _disc(lambda x, y: (x, y, np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))))
 
 
-def _disc(vector: Callable[[NDArray, NDArray], tuple[NDArray, NDArray, NDArray]]) -> Pixels:
+def _disc(vector: Callable[[NDArray[Any], NDArray[Any]], tuple[NDArray[Any], NDArray[Any], NDArray[Any]]]) -> Pixels:
     axis = (np.arange(_LEGEND, dtype=np.float32) + 0.5) * (2.0 / _LEGEND) - 1.0
     x, y = np.meshgrid(axis, -axis)
     colors = 0.5 + 0.5 * np.stack(vector(x, y), axis=-1)

@@ -7,6 +7,7 @@ OpenImageIO's built-in ACES one.
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
@@ -65,6 +66,6 @@ def _matrix(space: str, config: str) -> Matrix3:
     moved = oiio.ImageBufAlgo.colorconvert(primaries, LINEAR_REC709, space, unpremult=False, colorconfig=config)
     if moved.has_error:
         raise UsageError(f"the OCIO config cannot take {LINEAR_REC709} to '{space}': {moved.geterror()}")
-    columns: NDArray = np.asarray(moved.get_pixels(oiio.FLOAT))[0]
+    columns: NDArray[Any] = np.asarray(moved.get_pixels(oiio.FLOAT))[0]
     rounded = np.where(np.isclose(columns, np.eye(3), atol=1e-6), np.eye(3), columns)
     return tuple(tuple(float(value) for value in row) for row in rounded.T)

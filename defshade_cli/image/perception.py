@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from importlib.util import find_spec
 from math import log2
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from defshade_cli.image.colour import BRIGHTEST, Pixels
 REC709_LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
-def flip_map(a: NDArray, b: NDArray, display_referred: bool) -> Pixels | None:
+def flip_map(a: NDArray[Any], b: NDArray[Any], display_referred: bool) -> Pixels | None:
     """(H, W) FLIP error of RGB against the reference b: Andersson et al. 2020, for scene-linear images HDR-FLIP, 2021.
 
     Values are clamped to what it is defined for: [0, 1] in pictures, ≥ 0 in scene-linear images. None where the package
@@ -25,12 +26,12 @@ def flip_map(a: NDArray, b: NDArray, display_referred: bool) -> Pixels | None:
     return np.squeeze(_evaluate(a, b, display_referred, magma=False))
 
 
-def heat_map(a: NDArray, b: NDArray, display_referred: bool) -> Pixels:
+def heat_map(a: NDArray[Any], b: NDArray[Any], display_referred: bool) -> Pixels:
     """(H, W, 3) the FLIP error in the colours of magma, black for none. Needs the package flip-evaluator."""
     return _evaluate(a, b, display_referred, magma=True)
 
 
-def _evaluate(a: NDArray, b: NDArray, display_referred: bool, *, magma: bool) -> Pixels:
+def _evaluate(a: NDArray[Any], b: NDArray[Any], display_referred: bool, *, magma: bool) -> Pixels:
     import flip_evaluator
 
     brightest = 1.0 if display_referred else BRIGHTEST
@@ -40,7 +41,7 @@ def _evaluate(a: NDArray, b: NDArray, display_referred: bool, *, magma: bool) ->
     return flip_evaluator.evaluate(reference, test, mode, applyMagma=magma, parameters=parameters)[0]
 
 
-def delta_e(a: NDArray, b: NDArray, display_referred: bool) -> NDArray[np.float64]:
+def delta_e(a: NDArray[Any], b: NDArray[Any], display_referred: bool) -> NDArray[np.float64]:
     """(H, W) CIE ΔE2000 of RGB with Rec.709 primaries, sRGB-encoded in pictures: Sharma, Wu, Dalal 2005.
 
     White is 1; what is brighter or negative is clamped, as on a display.
@@ -59,7 +60,7 @@ def delta_e(a: NDArray, b: NDArray, display_referred: bool) -> NDArray[np.float6
 _D65 = (0.3127, 0.3290)
 
 
-def _exposures(reference: NDArray) -> dict[str, float]:
+def _exposures(reference: NDArray[Any]) -> dict[str, float]:
     """HDR-FLIP's range of exposures in stops, the median taken over lit pixels.
 
     The evaluator's own median is 0 where a black background fills half the image, and it then ends the process.

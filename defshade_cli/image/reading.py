@@ -45,7 +45,7 @@ def _open(path: Path) -> oiio.ImageInput:
     return source
 
 
-def parts(path: Path) -> Iterator[tuple[oiio.ImageSpec, NDArray]]:
+def parts(path: Path) -> Iterator[tuple[oiio.ImageSpec, NDArray[Any]]]:
     """Every part's header and its pixels (H, W, C) float32, of its data window. Raises OutputError."""
     source = _open(path)
     part = 0
@@ -58,7 +58,7 @@ def parts(path: Path) -> Iterator[tuple[oiio.ImageSpec, NDArray]]:
         part += 1
 
 
-def uncropped(spec: oiio.ImageSpec, pixels: NDArray) -> NDArray:
+def uncropped(spec: oiio.ImageSpec, pixels: NDArray[Any]) -> NDArray[Any]:
     """The pixels (H, W, C) of a data window in the display window of its header, zeros around them."""
     whole = (spec.full_height, spec.full_width)
     top, left = spec.y - spec.full_y, spec.x - spec.full_x

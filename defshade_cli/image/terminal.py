@@ -50,7 +50,7 @@ def _codes(colors: Pixels) -> NDArray[np.str_]:
 
 def _joined(*parts: NDArray[np.str_] | str) -> NDArray[np.str_]:
     """Texts one behind the other, element by element."""
-    return reduce(np.char.add, parts)  # type: ignore[arg-type, return-value]
+    return reduce(np.char.add, parts)  # type: ignore[arg-type]
 
 
 def _bytes(colors: Pixels) -> NDArray[np.uint8]:

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import PurePath
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import OpenImageIO as oiio
@@ -53,7 +53,7 @@ class TexelImage:
     srgb: the colours of uint8 texels are sRGB-encoded.  wrap: what the file says of itself, s and t; else black.
     """
 
-    texels: NDArray
+    texels: NDArray[Any]
     srgb: bool
     wrap: tuple[Wrap, Wrap] = ("black", "black")
 
@@ -133,7 +133,7 @@ def _read_image(source: Source, header: _Header, side: int) -> TexelImage:
     return TexelImage(np.ascontiguousarray(texels[::-1]), srgb and eight_bit, header.wrap)
 
 
-def _in_rec709(texels: NDArray, source: Source) -> NDArray[np.float32]:
+def _in_rec709(texels: NDArray[Any], source: Source) -> NDArray[np.float32]:
     """Colours of any space that the built-in OCIO config knows. Raises OSError for one that it does not."""
     scale = 255.0 if texels.dtype == np.uint8 else 1.0
     buffer = oiio.ImageBuf(np.ascontiguousarray(_four_channels(texels) / scale, np.float32))
@@ -151,7 +151,7 @@ def _level(image: oiio.ImageInput, side: int) -> int:
     return level
 
 
-def _reduced(pixels: NDArray, side: int, *, srgb: bool) -> NDArray:
+def _reduced(pixels: NDArray[Any], side: int, *, srgb: bool) -> NDArray[Any]:
     """No side longer than `side`: by means of 2x2, as mip levels are made, as far as those go.
 
     srgb: bytes are sRGB-encoded, and light is what is averaged.
@@ -166,7 +166,7 @@ def _reduced(pixels: NDArray, side: int, *, srgb: bool) -> NDArray:
     return _resampled(pixels, max(1, round(width * scale)), max(1, round(height * scale)))
 
 
-def _halved(pixels: NDArray) -> NDArray:
+def _halved(pixels: NDArray[Any]) -> NDArray[Any]:
     """Means of 2x2 of (even, even, C); integers are rounded half up."""
     wide = {"uint8": np.uint16, "uint16": np.uint32}.get(pixels.dtype.name, np.float32)
     rows = np.add(pixels[0::2], pixels[1::2], dtype=wide)
@@ -187,14 +187,14 @@ def _encoding() -> NDArray[np.uint8]:
     return np.searchsorted(edges, np.arange(65536), "right").astype(np.uint8)
 
 
-def _resampled(pixels: NDArray, width: int, height: int) -> NDArray:
+def _resampled(pixels: NDArray[Any], width: int, height: int) -> NDArray[Any]:
     size = oiio.ROI(0, width, 0, height, 0, 1, 0, pixels.shape[2])
     kind = {"uint8": oiio.UINT8, "float16": oiio.HALF}.get(pixels.dtype.name, oiio.FLOAT)
     buffer = oiio.ImageBufAlgo.resize(oiio.ImageBuf(np.ascontiguousarray(pixels)), roi=size)
     return np.asarray(buffer.get_pixels(kind))
 
 
-def _four_channels(pixels: NDArray) -> NDArray:
+def _four_channels(pixels: NDArray[Any]) -> NDArray[Any]:
     """As the UsdUVTexture schema says: one channel repeats, two are gray and alpha, a missing alpha is 1."""
     opaque = 255 if pixels.dtype == np.uint8 else 1
     channels = pixels.shape[2]
@@ -203,7 +203,7 @@ def _four_channels(pixels: NDArray) -> NDArray:
     return np.concatenate([color, alpha], axis=2)
 
 
-def _linear(texels: NDArray) -> NDArray:
+def _linear(texels: NDArray[Any]) -> NDArray[Any]:
     """sRGB's transfer curve undone on the colours: IEC 61966-2-1."""
     color = texels[..., :3]
     curved = ((np.maximum(color, 0.04045) + 0.055) / 1.055) ** 2.4
@@ -214,7 +214,7 @@ _LIGHT = np.round(65535.0 * _linear(np.arange(256)[:, None] / 255.0)[:, 0]).asty
 """(256,) of each code of sRGB the light, 65535 for white."""
 
 
-def _half(texels: NDArray) -> NDArray[np.float16]:
+def _half(texels: NDArray[Any]) -> NDArray[np.float16]:
     return np.nan_to_num(texels, nan=0.0, posinf=_HALF_MAX).clip(-_HALF_MAX, _HALF_MAX).astype(np.float16)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ class RelativeError:
     lit: int
 
 
-def relative_error(image: NDArray, reference: NDArray, *, floor: float = 1e-3) -> RelativeError:
+def relative_error(image: NDArray[Any], reference: NDArray[Any], *, floor: float = 1e-3) -> RelativeError:
     """Compare (H, W, 3) radiance pixel by pixel.
 
     A pixel is lit where the reference's mean channel passes `floor` of the image's 99th percentile: below,
@@ -36,7 +37,7 @@ def relative_error(image: NDArray, reference: NDArray, *, floor: float = 1e-3) -
     return RelativeError(float(median), float(p99), float(p999), float(errors.max()), len(errors))
 
 
-def relative_differences(image: NDArray, reference: NDArray, *, floor: float = 1e-3) -> NDArray[np.float64]:
+def relative_differences(image: NDArray[Any], reference: NDArray[Any], *, floor: float = 1e-3) -> NDArray[np.float64]:
     """(L,) the error of each lit pixel; NaN in the image counts as infinite."""
     level = reference.astype(np.float64).mean(axis=-1)
     positive = level[level > 0.0]

@@ -6,6 +6,7 @@ It shares no code with the shaders, so that agreement means something.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +45,11 @@ def reference_radiance(
 
 
 def shade(
-    surface: Surface, lights: Iterable[Light], link_sets: NDArray | None = None, *, shading: Shading = "preview-surface"
+    surface: Surface,
+    lights: Iterable[Light],
+    link_sets: NDArray[Any] | None = None,
+    *,
+    shading: Shading = "preview-surface",
 ) -> Array:
     """(P, 3) radiance towards the eye: emission plus every light's reflection, no shadows.
 

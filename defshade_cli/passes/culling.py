@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -34,7 +35,7 @@ class CommandBuffer:
         self._buffer = gpu.keep(gpu.context.buffer(reserve=256))
         self._ends = np.zeros(1, np.int64)
 
-    def write(self, runs: Sequence[NDArray]) -> None:
+    def write(self, runs: Sequence[NDArray[Any]]) -> None:
         """Upload runs of draw commands, (N,) records each, one behind the other."""
         data = np.concatenate(runs).tobytes()
         self._ends = np.cumsum([0, *map(len, runs)])

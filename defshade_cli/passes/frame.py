@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import moderngl
 
 from defshade_cli.gpu.context import Gpu
@@ -23,7 +25,7 @@ class Frame:
         self._size: Size = (0, 0)
         self._gbuffers: dict[tuple[tuple[Plane, ...], Layout], GBuffer] = {}
         self._radiance: dict[tuple[str, GBuffer | None], Target] = {}
-        self._lights: tuple[tuple, LightTargets | None] = (), None
+        self._lights: tuple[tuple[Any, ...], LightTargets | None] = (), None
         self._ranges: Target | None = None
         self._runs: moderngl.Texture | None = None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,7 @@ def light_records(
     eye: NDArray[np.float64],
     shadows: ShadowAtlas | None,
     tables: LightTables = NO_TABLES,
-) -> NDArray:
+) -> NDArray[Any]:
     """One Light record each, (L,); positions relative to the eye (3,)."""
     records = np.zeros(len(lights), record("Light"))
     if not len(records):
@@ -62,7 +63,7 @@ def light_records(
     return records
 
 
-def _set_styles(records: NDArray, lights: Sequence[Light], profiles: Sequence[IesProfile]) -> None:
+def _set_styles(records: NDArray[Any], lights: Sequence[Light], profiles: Sequence[IesProfile]) -> None:
     """Shaping and shadows of the few lights that have any of their own."""
     for number, light in enumerate(lights):
         if light.shaping is not None:
@@ -83,7 +84,7 @@ def _set_shaping(row: np.void, light: Light, profiles: Sequence[IesProfile]) -> 
         row["ies_vertical"] = shaping.ies_vertical
 
 
-def _set_shadow(rows: np.void | NDArray, shadow: ShadowStyle) -> None:
+def _set_shadow(rows: np.void | NDArray[Any], shadow: ShadowStyle) -> None:
     """Of one record or of all."""
     rows["shadow_color"], rows["shadow_distance"] = shadow.color, shadow.distance
     rows["shadow_fading"], rows["shadow_gamma"] = shadow.fading, shadow.gamma

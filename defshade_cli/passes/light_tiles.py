@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -46,7 +47,7 @@ class LightTiles:
         self._screen = Screen(gpu)
         self._array = cache(lambda variant: self._screen.array(_compile(gpu, variant, self._most)))
 
-    def begin(self, gbuffer: GBuffer, view: NDArray, plan: Plan) -> None:
+    def begin(self, gbuffer: GBuffer, view: NDArray[Any], plan: Plan) -> None:
         """What the tiles show, by the GBuffer and the View record (1,) that it was drawn with."""
         self._plan, perspective = plan, plan.camera.projection == "perspective"
         ranges = self._depth_ranges(gbuffer.layout, perspective)
@@ -59,7 +60,7 @@ class LightTiles:
     def add(
         self,
         lights: Sequence[PlannedLight],
-        records: NDArray,
+        records: NDArray[Any],
         gbuffer: GBuffer,
         targets: LightTargets,
         shadows: ShadowAtlas | None = None,
@@ -82,7 +83,7 @@ class LightTiles:
             for first in range(0, len(members), self._most):
                 self._draw(array, records[members[first : first + self._most]])
 
-    def _draw(self, array: moderngl.VertexArray, records: NDArray) -> None:
+    def _draw(self, array: moderngl.VertexArray, records: NDArray[Any]) -> None:
         lists = list_lights(light_bounds(records, self._camera_from_relative), self._boxes)
         if not len(lists.lights):
             return
@@ -128,7 +129,7 @@ def _compile(gpu: Gpu, variant: LightingVariant, most: int) -> moderngl.Program:
     return gpu.shaders.program("screen.vert", "lighting_tiles.frag", defines=defines, generated=generated)
 
 
-def light_bounds(records: NDArray, camera_from_relative: NDArray[np.float64]) -> LightBounds:
+def light_bounds(records: NDArray[Any], camera_from_relative: NDArray[np.float64]) -> LightBounds:
     """Of Light records (L,). camera_from_relative: (4, 4)."""
     rotation, offset = camera_from_relative[:3, :3], camera_from_relative[:3, 3]
     return LightBounds(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.scene import Scene
 
 
-def motion_records(scene: Scene, plan: Plan) -> NDArray:
+def motion_records(scene: Scene, plan: Plan) -> NDArray[Any]:
     """One Motion record a placement (P,), in the drawables' order; products taken in float64."""
     seen = [_seen(plan.camera, [d.world_from_object for d in scene.drawables], plan)] * 3
     for number, moment in zip((0, 2), scene.neighbours, strict=False):

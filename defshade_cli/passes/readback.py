@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from defshade_cli.spaces import transform_directions, transform_points
 
 log = logging.getLogger("defshade")
 
-Planes = dict[str, NDArray]
+Planes = dict[str, NDArray[Any]]
 
 
 def read_planes(gbuffer: GBuffer, wanted: Iterable[Plane], plan: Plan) -> Planes:
@@ -40,7 +41,7 @@ def data_layers(planes: Planes, plan: Plan, scene: Scene) -> dict[str, NDArray[n
     for name in plan.data_layers:
         layer = LAYERS[name]
         if layer.source == "visible":
-            values: NDArray = id_values(name, planes["visible"], identities)
+            values: NDArray[Any] = id_values(name, planes["visible"], identities)
         elif layer.source == "primvar":
             values = _primvar_values(name.removeprefix(PRIMVAR_FAMILY), planes, plan, scene)
         else:
@@ -49,7 +50,7 @@ def data_layers(planes: Planes, plan: Plan, scene: Scene) -> dict[str, NDArray[n
     return layers
 
 
-def _primvar_values(name: str, planes: Planes, plan: Plan, scene: Scene) -> NDArray:
+def _primvar_values(name: str, planes: Planes, plan: Plan, scene: Scene) -> NDArray[Any]:
     """As many numbers as the primvar has where it has most; one where no prim has it."""
     widths = [mesh.primvars[name].shape[1] for mesh in scene.meshes if name in mesh.primvars]
     if not widths:
@@ -57,7 +58,7 @@ def _primvar_values(name: str, planes: Planes, plan: Plan, scene: Scene) -> NDAr
     return planes[f"primvar_{plan.primvars.index(name)}"][..., : max(widths, default=1)]
 
 
-def _layer_values(layer: Layer, planes: Planes, camera: Camera) -> NDArray:
+def _layer_values(layer: Layer, planes: Planes, camera: Camera) -> NDArray[Any]:
     match layer.name:
         case "distance":
             return np.linalg.norm(_camera_positions(planes["depth"], camera), axis=-1, keepdims=True)

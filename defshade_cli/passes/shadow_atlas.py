@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import moderngl
 import numpy as np
@@ -75,7 +75,7 @@ class ShadowAtlas:
     first: NDArray[np.uint32]
     count: NDArray[np.uint32]
     first_record: NDArray[np.uint32]
-    uniforms: Mapping[str, tuple]
+    uniforms: Mapping[str, tuple[Any, ...]]
 
     def bind(self, program: moderngl.Program) -> moderngl.Texture:
         """Let `program` find texels; returns what holds them."""
@@ -108,7 +108,7 @@ def _projection(camera: Camera) -> Matrix:
     return clip_from_camera(camera, camera.window, camera.clipping_range, standard=False)
 
 
-def map_records(maps: Sequence[Camera], slots: Sequence[int], resolution: int) -> NDArray:
+def map_records(maps: Sequence[Camera], slots: Sequence[int], resolution: int) -> NDArray[Any]:
     """ShadowMap records (N,) of those of `maps` that are in `slots`; as many as the shaders' block has."""
     records = np.zeros(_MOST_RECORDS, record("ShadowMap"))
     for row, slot in zip(records, slots, strict=False):
@@ -120,7 +120,7 @@ def map_records(maps: Sequence[Camera], slots: Sequence[int], resolution: int) -
     return records
 
 
-def cube_uniforms(face: Camera, resolution: int) -> dict[str, tuple]:
+def cube_uniforms(face: Camera, resolution: int) -> dict[str, tuple[Any, ...]]:
     """Of all cubes of an atlas, by any of their faces."""
     matrix = _atlas_from_clip(0, 0, resolution) @ _nearer(face, resolution)
     return {

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -98,7 +99,7 @@ class ShadowPass:
         first_record = (np.cumsum(count == 1) - 1).astype(np.uint32)
         return ShadowAtlas(self._depth, first, count, first_record, uniforms)
 
-    def _draw_maps(self, draws: DrawList, maps: Sequence[Camera], resolution: int, casters: NDArray) -> None:
+    def _draw_maps(self, draws: DrawList, maps: Sequence[Camera], resolution: int, casters: NDArray[Any]) -> None:
         """Each map with the commands that it may see, those first that let nothing through."""
         kinds = len(self._programs)
         clips = [clip_from_relative(camera).T.astype(np.float32) for camera in maps]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from defshade_cli.settings import Layout
 from defshade_cli.spaces import Matrix, Window, inverse_rigid, rigid
 
 
-def view_record(plan: Plan, layout: Layout, sample: Sample = CENTRE) -> NDArray:
+def view_record(plan: Plan, layout: Layout, sample: Sample = CENTRE) -> NDArray[Any]:
     """(1,) View of one sample: its place in the pixel moves the window, its place on the lens the eye."""
     camera, standard = plan.camera, uses_standard_depth(layout)
     lens = lens_offset(camera, sample.lens)
@@ -84,7 +85,9 @@ def depth_coefficients(camera: Camera, clip: tuple[float, float], standard: bool
     return (at_far - at_near, at_near) if standard else (at_near - at_far, at_far)
 
 
-def camera_depth(camera: Camera, clip: tuple[float, float], standard: bool, stored: NDArray) -> NDArray[np.float64]:
+def camera_depth(
+    camera: Camera, clip: tuple[float, float], standard: bool, stored: NDArray[Any]
+) -> NDArray[np.float64]:
     """Planar depth (scene units) of stored values (H, W), +inf where nothing was drawn."""
     scale, offset = depth_coefficients(camera, clip, standard)
     linear = scale * stored.astype(np.float64) + offset

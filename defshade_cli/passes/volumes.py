@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +54,7 @@ def _polar(disc: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
     return np.column_stack([np.sin(angle * length)[:, None] * azimuth, np.cos(angle * length)])
 
 
-def _inner_radius(corners: NDArray[np.float64], triangles: NDArray) -> float:
+def _inner_radius(corners: NDArray[np.float64], triangles: NDArray[Any]) -> float:
     """Distance from the origin to the nearest face's plane."""
     a, b, c = corners[triangles].transpose(1, 0, 2)
     normal = np.cross(b - a, c - a)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 
-def frozen(values: Any, dtype: DTypeLike, *shape: int) -> NDArray:
+def frozen(values: Any, dtype: DTypeLike, *shape: int) -> NDArray[Any]:
     """`values` as a C-contiguous, read-only array (...) of `dtype`; −1 in `shape` stands for any length.
 
     Raises ValueError where the shape differs. Copies only where it must; the caller's array stays writable.

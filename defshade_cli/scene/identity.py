@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,5 +80,5 @@ class Identities:
                 yield drawable, subset
 
 
-def _table(runs: Iterator[NDArray]) -> Table:
+def _table(runs: Iterator[NDArray[Any]]) -> Table:
     return np.concatenate([[-1], *runs]).astype(np.int32)

@@ -7,7 +7,7 @@ after its last, 2 P₀ − P₁ and 2 Pₙ₋₁ − Pₙ₋₂.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -205,7 +205,7 @@ def _varying_weights(kind: Kind, varying_counts: NDArray[np.int64], places: Plac
     return _sparse(weight, row, column, (len(curve), int(varying_counts.sum())))
 
 
-def _sparse(weight: NDArray, row: NDArray, column: NDArray, shape: tuple[int, int]) -> Weights:
+def _sparse(weight: NDArray[Any], row: NDArray[Any], column: NDArray[Any], shape: tuple[int, int]) -> Weights:
     from scipy import sparse
 
     return sparse.csr_array((weight, (row, column)), shape=shape)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +58,7 @@ def drawables_of(
         yield Drawable(mesh, placed[0], tuple(subsets), paths, *placed[1:])
 
 
-def _standing(groups: Sequence[Sequence[Piece]], unauthored: Sequence[Material]) -> Iterator[Sequence[NDArray]]:
+def _standing(groups: Sequence[Sequence[Piece]], unauthored: Sequence[Material]) -> Iterator[Sequence[NDArray[Any]]]:
     """Of each group the matrices, ids, colours and opacities of its pieces, as runs of arrays that hold all.
 
     unauthored: has the colour of those that have none.
@@ -78,10 +79,10 @@ def _standing(groups: Sequence[Sequence[Piece]], unauthored: Sequence[Material])
         yield [array[first:end] for array in arrays]
 
 
-def _where_nan(values: NDArray[np.float32], others: Sequence, sizes: NDArray[np.intp]) -> NDArray[np.float32]:
+def _where_nan(values: NDArray[np.float32], others: Sequence[Any], sizes: NDArray[np.intp]) -> NDArray[np.float32]:
     """`values`, and of each group of so many one of `others` where they are NaN."""
     return np.where(np.isnan(values), np.repeat(np.array(others, np.float32), sizes, axis=0), values)
 
 
-def _joined(arrays: Sequence[NDArray]) -> NDArray:
+def _joined(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)

@@ -7,6 +7,8 @@ polygon of ears that are no neighbours: common shapes take some log n rounds, a 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -128,7 +130,7 @@ class _Rings:
         return held
 
 
-def _turn(a: NDArray, b: NDArray, c: NDArray) -> NDArray[np.float64]:
+def _turn(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any]) -> NDArray[np.float64]:
     """Twice the signed area of triangles (..., 2), positive counter-clockwise."""
     ab, ac = b - a, c - a
     return ab[..., 0] * ac[..., 1] - ab[..., 1] * ac[..., 0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +80,7 @@ def _topology(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> tuple[ND
     return counts, indices
 
 
-def _is_whole(points: NDArray, counts: NDArray, indices: NDArray) -> bool:
+def _is_whole(points: NDArray[Any], counts: NDArray[Any], indices: NDArray[Any]) -> bool:
     """Is everything there and drawn: three corners a face and more, at points that exist and are finite?
 
     Reductions of ufuncs, and one for both ends of a range: arrays are small, and each question counts.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,7 +119,7 @@ def _opposed(polygons: Polygons, normals: Primvar) -> bool:
     return bool(along < _OPPOSED * (np.linalg.norm(areas, axis=1) @ polygons.counts))
 
 
-def _unit(vectors: NDArray) -> NDArray[np.float32]:
+def _unit(vectors: NDArray[Any]) -> NDArray[np.float32]:
     """(N, 3) unit vectors; what has no length becomes the normal of no shape."""
     length = np.sqrt(np.einsum("ni,ni->n", vectors, vectors, dtype=np.float64))[:, None]
     units = np.empty(vectors.shape, np.float32)

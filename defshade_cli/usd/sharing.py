@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -23,8 +23,8 @@ def shared(new: T, old: T | None) -> T:
     if is_dataclass(new) and not isinstance(new, type):
         return cast(T, _shared_fields(new, old))
     if isinstance(new, Mapping):
-        parts = {name: shared(part, cast(Mapping, old).get(name)) for name, part in new.items()}
-        return old if _are_one(parts, cast(dict, old)) else cast(T, parts)
+        parts = {name: shared(part, cast(Mapping[str, Any], old).get(name)) for name, part in new.items()}
+        return old if _are_one(parts, cast(dict[str, Any], old)) else cast(T, parts)
     return old if new == old else new
 
 

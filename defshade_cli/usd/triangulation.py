@@ -6,6 +6,8 @@ are clipped ear by ear.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -40,7 +42,7 @@ def triangulate(polygons: Polygons, issues: list[str]) -> Triangles:
     return triangles, np.repeat(np.arange(len(per_face), dtype=np.int32), per_face)
 
 
-def _cut(points: NDArray[np.float32], indices: NDArray) -> NDArray[np.intp]:
+def _cut(points: NDArray[np.float32], indices: NDArray[Any]) -> NDArray[np.intp]:
     """Triangles (B, n − 2, 3), as corners 0…n−1, of B faces (B, n)."""
     match indices.shape[1]:
         case 3:
@@ -63,7 +65,7 @@ def _folded(quads: NDArray[np.float64]) -> NDArray[np.bool_]:
     return folded
 
 
-def _agreement(a: NDArray, b: NDArray, c: NDArray, d: NDArray) -> NDArray[np.float64]:
+def _agreement(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any], d: NDArray[Any]) -> NDArray[np.float64]:
     """(B,) the product of the normals of triangles abc and acd, areas included."""
     return np.einsum("bi,bi->b", cross(b - a, c - a), cross(c - a, d - a))
 

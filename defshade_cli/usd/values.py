@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ FARTHEST = 1e18
 STANDS_NOWHERE = f"its transform is not finite, or goes beyond {FARTHEST:g}"
 
 
-def within_reach(numbers: NDArray) -> NDArray[np.bool_]:
+def within_reach(numbers: NDArray[Any]) -> NDArray[np.bool_]:
     """Which (N,) are finite, and no greater than FARTHEST."""
     return np.abs(numbers) <= FARTHEST
 
@@ -39,7 +40,7 @@ def is_finite(value: object) -> bool:
     return array.dtype.kind != "f" or bool(np.isfinite(array).all())
 
 
-def are_finite(numbers: NDArray) -> bool:
+def are_finite(numbers: NDArray[Any]) -> bool:
     """Whether a contiguous array (...) is finite. Its squares' sum tells at once, unless that overflows."""
     flat = numbers.ravel()
     return math.isfinite(np.dot(flat, flat)) or bool(np.isfinite(flat).all())

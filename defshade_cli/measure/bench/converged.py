@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from numpy.typing import NDArray
 
@@ -22,7 +23,7 @@ from defshade_cli.settings import OutputSettings, RenderJob
 class Converged:
     """pixels: (H, W, 3) scene-linear radiance.  path: the file it was read from or is kept in, if any."""
 
-    pixels: NDArray
+    pixels: NDArray[Any]
     path: Path | None
 
 

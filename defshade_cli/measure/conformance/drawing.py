@@ -236,7 +236,7 @@ def _over(rgba: Picture, background: tuple[float, float, float]) -> Picture:
     return rgba[..., :3] + (1.0 - rgba[..., 3:]) * np.array(background, np.float32)
 
 
-def _srgb(linear: NDArray) -> Picture:
+def _srgb(linear: NDArray[Any]) -> Picture:
     """IEC 61966-2-1."""
     x = np.clip(np.nan_to_num(linear), 0.0, 1.0)
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055).astype(np.float32)

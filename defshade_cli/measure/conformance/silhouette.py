@@ -10,6 +10,8 @@ neighbouring pixels: there a pixel counts where half of it is covered.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,17 +24,17 @@ ANY_SAMPLE, HALF = 0.003, 0.5
 _STEP = 1.0 / 255.0
 
 
-def mask_of_alpha(alpha: NDArray, threshold: float) -> Mask:
+def mask_of_alpha(alpha: NDArray[Any], threshold: float) -> Mask:
     """(H, W)"""
     return alpha > threshold
 
 
-def mask_of_color(rgb: NDArray, background: Color) -> Mask:
+def mask_of_color(rgb: NDArray[Any], background: Color) -> Mask:
     """(H, W) of a picture (H, W, 3) in [0, 1]; a difference of one step of 8 bits is rounding."""
     return np.abs(rgb.astype(np.float64) - background).max(axis=-1) > 1.5 * _STEP
 
 
-def even_background(rgb: NDArray) -> Color | None:
+def even_background(rgb: NDArray[Any]) -> Color | None:
     """The colour (3,) of all four corners; None where they differ."""
     corners = rgb[[0, 0, -1, -1], [0, -1, 0, -1]].astype(np.float64)
     if (np.abs(corners - corners[0]) > 1.5 * _STEP).any():

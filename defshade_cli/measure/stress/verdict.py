@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +69,7 @@ def _sampled(settings: RenderSettings) -> RenderSettings:
     return replace(settings, layers=("beauty",), samples=2, shadows=True, light_points=2)
 
 
-def _worst(image: NDArray, exact: NDArray[np.float64]) -> tuple[float, tuple[int, int], int]:
+def _worst(image: NDArray[Any], exact: NDArray[np.float64]) -> tuple[float, tuple[int, int], int]:
     level = exact.mean(axis=-1)
     lit = level > _FLOOR * level.max(initial=0.0)
     if not lit.any():

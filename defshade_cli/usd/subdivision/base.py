@@ -7,6 +7,7 @@ non-manifold edges are infinitely sharp, and so is a vertex whose faces do not f
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +65,7 @@ def _authored_sharpness(topology: Topology, edge_vertices: Indices) -> NDArray[n
     return sharpness
 
 
-def _keys(pairs: NDArray, vertex_count: int) -> NDArray[np.int64]:
+def _keys(pairs: NDArray[Any], vertex_count: int) -> NDArray[np.int64]:
     return pairs[:, 0].astype(np.int64) * vertex_count + pairs[:, 1]
 
 

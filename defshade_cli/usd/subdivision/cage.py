@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,7 +128,7 @@ class Cage:
             2 * arriving + (self.origin != self.edge_vertices[arriving, 0]),
         )
 
-    def _child(self, origin: NDArray, edge: NDArray, inner_edges: NDArray, added_vertices: int) -> Cage:
+    def _child(self, origin: NDArray[Any], edge: NDArray[Any], inner_edges: NDArray[Any], added_vertices: int) -> Cage:
         """The next level, of faces that all have origin.shape[1] vertices."""
         middle = self.vertex_count + np.arange(self.edge_count)
         halves = np.stack([self.edge_vertices[:, 0], middle, middle, self.edge_vertices[:, 1]], axis=1)

@@ -8,7 +8,7 @@ Face-varying interpolation rules").
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ _JUNCTIONS_PINNED = ("cornersPlus1", "cornersPlus2")
 
 def refine_face_varying(
     topology: Topology,
-    indices: NDArray,
+    indices: NDArray[Any],
     value_count: int,
     rule: LinearInterpolation,
     level: int,
@@ -53,7 +53,7 @@ def refine_face_varying(
     return Stencils((authored, *stencils.masks)), cage.origin
 
 
-def _check(topology: Topology, indices: NDArray, value_count: int, rule: str) -> None:
+def _check(topology: Topology, indices: NDArray[Any], value_count: int, rule: str) -> None:
     if rule not in get_args(LinearInterpolation):
         raise ValueError(f"face-varying rule is {rule!r}, not one of {', '.join(get_args(LinearInterpolation))}")
     if len(indices) != len(topology.face_indices):
@@ -79,7 +79,7 @@ class _ValueMesh:
     on_boundary: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, control: Cage, indices: NDArray, value_count: int) -> _ValueMesh:
+    def of(cls, control: Cage, indices: NDArray[Any], value_count: int) -> _ValueMesh:
         keys = control.origin.astype(np.int64) * value_count + indices
         found, inverse = np.unique(keys, return_inverse=True)
         vertex, source = np.divmod(found, value_count)

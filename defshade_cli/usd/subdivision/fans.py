@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +45,7 @@ def walk(cage: Cage, joins: NDArray[np.bool_]) -> Fans:
     return _numbered(cage, head, rank, closed)
 
 
-def _follow(following: Indices, first: NDArray, rank: Indices, head: Indices) -> None:
+def _follow(following: Indices, first: NDArray[Any], rank: Indices, head: Indices) -> None:
     """Fills in `rank` and `head`, the first half-edge, along fans; one pass for each face that the longest has."""
     start = current = first
     step = 0

@@ -11,6 +11,7 @@ across the edge all the same.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ class Limit:
     vertices: Indices
     sectors: Indices
 
-    def normals(self, refined_points: NDArray) -> NDArray[np.float64]:
+    def normals(self, refined_points: NDArray[Any]) -> NDArray[np.float64]:
         """(S, 3) unit normals for points (V, 3); zero where the surface has collapsed."""
         return normalize(np.cross(self.tangent1 @ refined_points, self.tangent2 @ refined_points))
 
@@ -113,7 +114,9 @@ def _tangents(cage: Cage, scheme: Scheme, sectors: Fans) -> tuple[Masks, Masks]:
     )
 
 
-def _ring_entries(cage: Cage, scheme: Scheme, sectors: Fans, wave: np.ufunc, scale: NDArray) -> tuple[Entries, Entries]:
+def _ring_entries(
+    cage: Cage, scheme: Scheme, sectors: Fans, wave: np.ufunc, scale: NDArray[Any]
+) -> tuple[Entries, Entries]:
     """A wave over the neighbours of a vertex and over the vertices across its faces, times `scale` (S,)."""
     theta = (np.where(sectors.closed, 2.0, 1.0) * np.pi / sectors.size)[sectors.fan]
     weight = scale[sectors.fan]
@@ -124,7 +127,7 @@ def _ring_entries(cage: Cage, scheme: Scheme, sectors: Fans, wave: np.ufunc, sca
     )
 
 
-def _sector_weights(scheme: Scheme, sectors: Fans) -> tuple[NDArray, NDArray, NDArray]:
+def _sector_weights(scheme: Scheme, sectors: Fans) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     """(S,) weights of the inner edges, the bounding ones and the centre, which makes the sum zero."""
     theta = np.pi / sectors.size
     inner, bounding = scheme.sector_weights(theta)

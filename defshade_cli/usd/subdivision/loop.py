@@ -6,6 +6,8 @@ surface reconstruction", 1994, with the B-spline along them as OpenSubdiv has it
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +16,7 @@ from defshade_cli.usd.subdivision.creases import RuleMix, crease_entries, limit_
 from defshade_cli.usd.subdivision.stencil import Entries, Masks, assemble
 
 
-def beta(valence: NDArray) -> NDArray[np.float64]:
+def beta(valence: NDArray[Any]) -> NDArray[np.float64]:
     """Loop's weight (V,) of each neighbour: (5/8 − (3/8 + cos(2π/n)/4)²)/n."""
     return (5 / 8 - (3 / 8 + np.cos(2 * np.pi / valence) / 4) ** 2) / valence
 
@@ -35,7 +37,7 @@ def limit(cage: Cage) -> Masks:
     return assemble((cage.vertex_count,) * 2, *_ring_entries(cage, mix, neighbour), *creases)
 
 
-def _ring_entries(cage: Cage, mix: RuleMix, neighbour: NDArray) -> tuple[Entries, Entries, Entries]:
+def _ring_entries(cage: Cage, mix: RuleMix, neighbour: NDArray[Any]) -> tuple[Entries, Entries, Entries]:
     """Smooth vertices: `neighbour` (V,) of each neighbour, the rest of the vertex itself. Corners: the vertex."""
     vertices = np.arange(cage.vertex_count)
     start, end = cage.edge_vertices.T

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import reduce
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # scipy is a quarter of a second to import, and not every sta
     from scipy import sparse
 
 Masks: TypeAlias = "sparse.csr_array"
-Entries: TypeAlias = tuple[NDArray, NDArray, ArrayLike]
+Entries: TypeAlias = tuple[NDArray[Any], NDArray[Any], ArrayLike]
 """(rows, columns, weights); a single weight stands for all."""
 
 
@@ -26,7 +26,7 @@ def assemble(shape: tuple[int, int], *entries: Entries) -> Masks:
     return sparse.csr_array((np.concatenate(weights), places), shape=shape)
 
 
-def _used(entries: Entries) -> tuple[NDArray, NDArray, NDArray[np.float64]]:
+def _used(entries: Entries) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.float64]]:
     rows, columns = entries[:2]
     weights = np.broadcast_to(np.asarray(entries[2], np.float64), rows.shape)
     used = np.flatnonzero(weights)
@@ -49,7 +49,7 @@ class Stencils:
 
     masks: tuple[Masks, ...]
 
-    def __matmul__(self, values: NDArray) -> NDArray[np.float64]:
+    def __matmul__(self, values: NDArray[Any]) -> NDArray[np.float64]:
         """(N, ...) values from (control N, ...) ones."""
         return reduce(lambda finer, mask: mask @ finer, self.masks, np.asarray(values, np.float64))
 

@@ -122,7 +122,7 @@ def _require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
         raise ValueError(f"{name} is {value!r}, not one of {', '.join(choices)}")
 
 
-def _require_range(name: str, indices: NDArray, count: int, of: str) -> None:
+def _require_range(name: str, indices: NDArray[Any], count: int, of: str) -> None:
     outside = (indices < 0) | (indices >= count)
     if outside.any():
         raise ValueError(f"{name} {indices[outside.argmax()]} is outside the {count} {of}")
