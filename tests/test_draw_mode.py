@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import OpenImageIO as oiio
 import pytest
 from pxr import Usd
 
 from defshade_cli.image.reading import read as read_image
+from defshade_cli.image.texture import world_to_screen
 from defshade_cli.rendering import render
 from defshade_cli.scene.geometry import world_boxes
 from defshade_cli.scene.scene import Scene
@@ -151,9 +153,53 @@ def test_textures_lie_on_cards_as_in_hydra(
     np.testing.assert_array_equal(mesh.uvs["cardsUv"][corner], texel)
 
 
-def test_cards_placed_by_their_textures_are_reported() -> None:
-    (issue,) = read(model(mode("cards") + 'uniform token model:cardGeometry = "fromTexture"')).unsupported
-    assert issue.reason == "cardGeometry fromTexture: its cards are crossed inside the bounds"
+FROM_TEXTURE = mode("cards") + 'uniform token model:cardGeometry = "fromTexture"\n'
+
+
+def seen(path: Path, screen_from_model: np.ndarray) -> str:
+    """A card's texture whose header says where it was seen from."""
+    spec = oiio.ImageSpec(2, 2, 3, oiio.HALF)
+    spec.attribute("worldtoscreen", oiio.TypeMatrix, tuple(screen_from_model.T.ravel().tolist()))
+    image = oiio.ImageBuf(spec)
+    image.set_pixels(oiio.ROI.All, np.full((2, 2, 3), 0.5, np.float32))
+    assert image.write(str(path))
+    return str(path)
+
+
+def test_cards_are_placed_by_their_textures(tmp_path: Path) -> None:
+    """One 4 wide and 2 high at x = 5, of an orthographic view along +x with -y to the right and z up."""
+    screen_from_model = np.array([[0, -0.5, 0, 0], [0, 0, -1, 1], [1, 0, 0, -5], [0, 0, 0, 1]])
+    file = seen(tmp_path / "seen.exr", screen_from_model)
+    scene = read(model(FROM_TEXTURE + card("XPos", file) + card("ZNeg", file)), seen_from=world_to_screen)
+    mesh, (drawable,) = scene.meshes[0], scene.drawables
+    assert len(mesh.triangles) == 4 and len(drawable.paths) == 1
+    np.testing.assert_allclose(mesh.bounds, [[5, -2, 0], [5, 2, 2]])
+    top_left = (mesh.points == np.array([5, 2, 2], np.float32)).all(axis=1)
+    np.testing.assert_array_equal(mesh.uvs["cardsUv"][top_left], [[0, 1]] * 2)
+    assert (mesh.normals[:, 0] < 0).all(), "they face the viewer"
+    assert [m.path for m in scene.materials] == ["/model.model:cardTextureXPos", "/model.model:cardTextureZNeg"]
+
+
+def test_cards_may_be_seen_in_perspective(tmp_path: Path) -> None:
+    """From the origin along +z, 2 away: what is at (x, y, z) is seen at (x, y) / z."""
+    screen_from_model = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -2], [0, 0, 1, 0]])
+    text = model(FROM_TEXTURE + card("YPos", seen(tmp_path / "seen.exr", screen_from_model)))
+    scene = read(text, seen_from=world_to_screen)
+    np.testing.assert_allclose(scene.meshes[0].bounds, [[-2, -2, 2], [2, 2, 2]])
+
+
+def test_textures_that_place_no_card_are_reported(tmp_path: Path) -> None:
+    other = f"{tmp_path}/other.png"
+    oiio.ImageBuf(np.ones((2, 2, 3), np.float32)).write(other, "uint8")
+    flat = seen(tmp_path / "flat.exr", np.zeros((4, 4)))
+    textures = card("XPos", other) + card("YPos", flat) + card("ZPos", "gone.png")
+    scene = read(model(FROM_TEXTURE + textures) + 'def Cube "other" {}', seen_from=world_to_screen)
+    assert [issue.reason for issue in scene.unsupported] == [
+        "model:cardTextureXPos has no card: its header has no worldtoscreen",
+        "model:cardTextureYPos has no card: its worldtoscreen cannot be inverted",
+        "model:cardTextureZPos has no card: no file gone.png",
+    ]
+    assert paths(scene) == {"/other"}
 
 
 def test_a_card_without_its_file_is_reported() -> None:

@@ -9,6 +9,7 @@ from defshade_cli.farm.own_settings import with_own_settings
 from defshade_cli.farm.shots import Shot, layers_of, make_shot, wanted_products
 from defshade_cli.image.layers.extras import extras_of
 from defshade_cli.image.layers.variables import layer_of
+from defshade_cli.image.texture import world_to_screen
 from defshade_cli.scene.framing import THREE_QUARTER, Framing
 from defshade_cli.scene.product import Product
 from defshade_cli.settings import RenderJob, RenderSettings
@@ -83,6 +84,7 @@ class OpenJob:
             framing=_framing(settings),
             studio=settings.studio,
             extras=extras_of(layers),
+            seen_from=world_to_screen,
             beside=next(iter(self._readers.values()), None),
         )
 

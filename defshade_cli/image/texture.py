@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.image.render_space import LINEAR_REC709
 from defshade_cli.scene.texture import STATED_SPACES, ColorSpace, ImageFile, Wrap
+from defshade_cli.spaces import Matrix
 
 log = logging.getLogger("defshade")
 
@@ -102,6 +103,13 @@ def resized(image: TexelImage, size: tuple[int, int]) -> TexelImage:
     if image.texels.shape[1::-1] == size:
         return image
     return replace(image, texels=_resampled(image.texels, *size))
+
+
+def world_to_screen(file: ImageFile) -> Matrix | None:
+    """scene.texture.SeenFrom by the image's header. Raises OSError with the reason."""
+    with _opened(file) as image:
+        values = np.ravel(image.spec().getattribute("worldtoscreen") or ())
+    return values.astype(np.float64).reshape(4, 4) if values.size == 16 and values.dtype.kind in "fi" else None
 
 
 def _read_header(file: ImageFile) -> _Header:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
+
+from defshade_cli.spaces import Matrix
 
 ColorSpace = str
 """auto, sRGB, raw, or a colour space by its Color Interop ID, such as lin_ap1_scene."""
@@ -26,6 +29,13 @@ class ImageFile:
 
     path: str
     contents: bytes | None = field(default=None, compare=False, repr=False)
+
+
+SeenFrom = Callable[[ImageFile], Matrix | None]
+"""What tells (4, 4), for row vectors, from what an image shows to where it is in it; None where nothing says it.
+
+Raises OSError with the reason.
+"""
 
 
 @dataclass(frozen=True, slots=True)

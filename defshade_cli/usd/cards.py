@@ -1,7 +1,8 @@
 """Cards: up to six textured quads that stand for a model, on the faces of its box or crossed inside it.
 
 Placement and texture coordinates are Hydra's (the stand-ins for draw modes in UsdImaging): a card without a texture of
-its own shows the opposite one's, mirrored; where only some axes have textures, the others have no cards.
+its own shows the opposite one's, mirrored; where only some axes have textures, the others have no cards. Cards placed
+by their textures lie where `worldtoscreen` in the headers of these says that they were seen.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from pxr import Usd, UsdGeom
 
 from defshade_cli.scene.material import Color, Material
 from defshade_cli.scene.scene import Unsupported
-from defshade_cli.scene.texture import Texture, TextureInput
+from defshade_cli.scene.texture import SeenFrom, Texture, TextureInput
 from defshade_cli.usd.material import ReadMaterial
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.texture import Unreadable, image_tiles
@@ -28,28 +29,69 @@ _CUT_OFF = 0.1
 _CORNERS = np.array([[1, 1], [0, 1], [0, 0], [1, 0]], np.float64)
 """Of every card, to the right and up as seen from outside, counter-clockwise."""
 
+_SCREEN = np.array([[-1, -1, 0, 1], [-1, 1, 0, 1], [1, 1, 0, 1], [1, -1, 0, 1]], np.float64)
+_SCREEN_UVS = np.array([[0, 1], [0, 0], [1, 0], [1, 1]], np.float32)
+"""Corners of a card placed by its texture, as rows in clip space, whose y points down."""
+
 
 def read_cards(
-    model: Usd.Prim, box: NDArray[np.float64], issues: list[str]
+    model: Usd.Prim, box: NDArray[np.float64], issues: list[str], seen_from: SeenFrom | None
 ) -> tuple[Polygons, tuple[str, ...], NDArray[np.intp]]:
     """The cards for a model with bounds `box` (2, 3), the names of their materials, and which each card has (F,)."""
     geometry = UsdGeom.ModelAPI(model).GetModelCardGeometryAttr().Get()
     if geometry == UsdGeom.Tokens.fromTexture:
-        issues.append("cardGeometry fromTexture: its cards are crossed inside the bounds")
+        return _read_seen_cards(model, issues, seen_from)
     sources = _sources(model)
     drawn = [card for card in range(6) if sources[card] is not None]
     depth = 1.0 if geometry == UsdGeom.Tokens.box else 0.5
     units = np.array([_placed(card, depth) for card in drawn]).reshape(-1, 3)
     uvs = np.array([_mapped(card, sources[card] == _texture(card)) for card in drawn]).reshape(-1, 2)
-    polygons = Polygons(
-        points=(box[0] + units * (box[1] - box[0])).astype(np.float32),
-        counts=np.full(len(drawn), 4),
-        indices=np.arange(4 * len(drawn)),
-        faces=np.arange(len(drawn), dtype=np.int32),
-        uvs={_UV: Primvar(uvs.astype(np.float32), "vertex")},
-    )
+    polygons = _quads(box[0] + units * (box[1] - box[0]), uvs)
     names = tuple(dict.fromkeys(name for name in sources if name))
     return polygons, names, np.array([names.index(sources[card] or "") for card in drawn], np.intp)
+
+
+def _read_seen_cards(
+    model: Usd.Prim, issues: list[str], seen_from: SeenFrom | None
+) -> tuple[Polygons, tuple[str, ...], NDArray[np.intp]]:
+    """A card for each texture that says where it was seen from; the others are reported."""
+    placed: dict[str, NDArray[np.float64]] = {}
+    for name in (_texture(card) for card in range(6) if _asset_path(model, card)):
+        try:
+            placed[name] = _seen_corners(model.GetAttribute(name), seen_from)
+        except Unreadable as reason:
+            issues.append(f"{name} has no card: {reason}")
+    points = np.array(list(placed.values())).reshape(-1, 3)
+    return _quads(points, np.tile(_SCREEN_UVS, (len(placed), 1))), tuple(placed), np.arange(len(placed))
+
+
+def _seen_corners(texture: Usd.Attribute, seen_from: SeenFrom | None) -> NDArray[np.float64]:
+    """(4, 3) in the model's space. Raises Unreadable."""
+    (_, file), *_ = image_tiles(texture.Get(), texture)
+    try:
+        screen_from_model = seen_from(file) if seen_from else None
+        if screen_from_model is None:
+            raise Unreadable("its header has no worldtoscreen")
+        corners = _SCREEN @ np.linalg.inv(screen_from_model)
+    except OSError as error:
+        raise Unreadable(str(error)) from error
+    except np.linalg.LinAlgError as error:
+        raise Unreadable("its worldtoscreen cannot be inverted") from error
+    if not np.isfinite(corners).all() or not corners[:, 3].all():
+        raise Unreadable("its worldtoscreen places it at infinity")
+    return corners[:, :3] / corners[:, 3:]
+
+
+def _quads(points: NDArray[np.float64], uvs: NDArray[np.floating]) -> Polygons:
+    """Of corners (4 Q, 3), with their texture coordinates (4 Q, 2)."""
+    count = len(points) // 4
+    return Polygons(
+        points=points.astype(np.float32),
+        counts=np.full(count, 4),
+        indices=np.arange(4 * count),
+        faces=np.arange(count, dtype=np.int32),
+        uvs={_UV: Primvar(uvs.astype(np.float32), "vertex")},
+    )
 
 
 def read_card_material(texture: Usd.Attribute, color: Color, shown_as: str) -> ReadMaterial:

@@ -12,6 +12,7 @@ from pxr import Kind, Sdf, Usd, UsdGeom
 
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Unsupported
+from defshade_cli.scene.texture import SeenFrom
 from defshade_cli.usd.cards import UNTEXTURED, read_card_material, read_cards
 from defshade_cli.usd.geometry import Surface
 from defshade_cli.usd.material import ReadMaterial
@@ -57,7 +58,8 @@ def takes_effect(prim: Usd.Prim) -> bool:
 class StandIns:
     """What is drawn in place of models; the boxes of their geometry are kept."""
 
-    def __init__(self) -> None:
+    def __init__(self, seen_from: SeenFrom | None = None) -> None:
+        self._seen_from = seen_from
         purposes = [UsdGeom.Tokens.default_, UsdGeom.Tokens.proxy, UsdGeom.Tokens.render]
         self._boxes = UsdGeom.BBoxCache(Usd.TimeCode.EarliestTime(), purposes, useExtentsHint=True)
 
@@ -73,7 +75,7 @@ class StandIns:
             if box is None:
                 return _surface(path, (), _lines(np.zeros((2, 3)), _AXES[:0]), None, ["it has no bounds to draw"])
             if mode == UsdGeom.Tokens.cards:
-                polygons, names, group = read_cards(prim, box, issues)
+                polygons, names, group = read_cards(prim, box, issues, self._seen_from)
             else:
                 polygons = _lines(box, _EDGES)
         return _surface(path, names, polygons, group, issues)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
+from defshade_cli.scene.texture import SeenFrom
 from defshade_cli.usd import draw_mode
 from defshade_cli.usd.binding import NOTHING_ABOVE, Bindings, Bound, read_bound
 from defshade_cli.usd.blame import blamed
@@ -26,12 +27,20 @@ from defshade_cli.usd.subsets import material_subsets
 class Memory:
     """The unchanging parts of one stage, and the names of what stands in its prototypes.
 
+    seen_from: for cards placed by their textures.
     as_cages: what is round is what Hydra draws of it: see gprims.read_solid, and facing.
     kinds: of prims.  rigs: what skeletons deform.
     xforms: USD's cache, which drops only what varies when its time is set.
     """
 
-    def __init__(self, stage: Usd.Stage, extras: Extras = NO_EXTRAS, *, as_cages: bool = False) -> None:
+    def __init__(
+        self,
+        stage: Usd.Stage,
+        extras: Extras = NO_EXTRAS,
+        *,
+        as_cages: bool = False,
+        seen_from: SeenFrom | None = None,
+    ) -> None:
         self.kinds = Kinds()
         self.rigs = Rigs()
         self.xforms = UsdGeom.XformCache()
@@ -42,7 +51,7 @@ class Memory:
         self._bindings: dict[str, Bound] = {"/": NOTHING_ABOVE}
         self._materials: dict[Sdf.Path, ReadMaterial] = {}
         self._first_instances: dict[str, str] = {}
-        self._models = draw_mode.StandIns()
+        self._models = draw_mode.StandIns(seen_from)
         self._stand_ins: dict[tuple[Sdf.Path, str], Surface] = {}
 
     def surface_around(self, prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode, said: Said) -> Surface | None:

@@ -21,6 +21,7 @@ from defshade_cli.scene.light import Light
 from defshade_cli.scene.motion import Moment, moment_of
 from defshade_cli.scene.scene import Scene, Unsupported
 from defshade_cli.scene.studio import studio_lights
+from defshade_cli.scene.texture import SeenFrom
 from defshade_cli.scene.view import View
 from defshade_cli.settings import Complexity
 from defshade_cli.spaces import Window, conform_window
@@ -59,7 +60,7 @@ class StageReader:
     complexity: of subdivision surfaces and, where it is not `auto`, of solids as Hydra makes cages of them; for `auto`
         it matters how large the image is, see scene.camera.image_size.
     framing: a camera of ours in place of the stage's.  studio: lights of ours where the stage has none.
-    extras: what only some layers need.
+    extras: what only some layers need.  seen_from: for cards placed by their textures, which reads their headers.
     beside: a reader of the same stage, whose memory is shared.
     Raises PrimNotFound for a camera or render settings that the stage lacks.
     """
@@ -78,12 +79,15 @@ class StageReader:
         framing: Framing | Held | None = None,
         studio: bool = False,
         extras: Extras = NO_EXTRAS,
+        seen_from: SeenFrom | None = None,
         beside: StageReader | None = None,
     ) -> None:
         self._complexity, self._size, self._width = complexity, size, width
         self._extras, self._framing, self._studio = extras, framing, studio
         as_cages = complexity != "auto"
-        self._memory: Memory = beside._memory if beside else Memory(stage, extras, as_cages=as_cages)
+        self._memory: Memory = (
+            beside._memory if beside else Memory(stage, extras, as_cages=as_cages, seen_from=seen_from)
+        )
         self._tessellation: Tessellation = beside._tessellation if beside else Tessellation()
         self._settings = read_settings(stage, render_settings, product)
         self._stage, self._purposes = stage, tuple(self._settings.purposes if purposes is None else purposes)
