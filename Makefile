@@ -16,7 +16,7 @@
 #   make kill-check  kill renders at 200 random moments
 #   make stress  render the corners of the arithmetic, into docs/stability.md
 #   make conformance  lay stages by others beside their references, into build/conformance and docs/conformance.md
-#   make bench-farm  frames a second by the number of workers
+#   make bench-farm  measure what a batch costs by its workers and chunks, into docs/scale.md
 #   make farm-check  a batch of a thousand frames while workers die and the disk fills
 #   make gallery  render the documents' figures into docs/images
 #   make wheel   build dist/*.whl and dist/*.tar.gz
@@ -95,9 +95,7 @@ kill-check: .venv/.ready-dev
 	DEFSHADE_KILLS=200 $(BIN)/pytest -q tests/test_faults.py -k killed
 
 bench-farm: .venv/.ready-dev
-	$(BIN)/python benchmarks/throughput.py
-	$(BIN)/python benchmarks/chunks.py
-	$(BIN)/python benchmarks/dask_scale.py
+	$(BIN)/python benchmarks/farm.py --page docs/scale.md
 
 farm-check: .venv/.ready-dev
 	$(BIN)/pytest -q -s -m slow tests/test_farm_scale.py

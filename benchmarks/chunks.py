@@ -1,4 +1,4 @@
-"""What a chunk costs beside its frames: the same frames in chunks of one and of sixteen: `make bench-farm`.
+"""What a chunk costs beside its frames: the same frames in chunks of one and of sixteen.
 
     python benchmarks/chunks.py [ROUNDS]
 
@@ -11,6 +11,7 @@ from __future__ import annotations
 import sys
 import tempfile
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 from throughput import STAGE, children_seconds
@@ -22,28 +23,33 @@ from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
 FRAMES, SIZES = 64, (1, 16)
 
 
-def main(rounds: int) -> None:
-    wall: dict[int, list[float]] = {size: [] for size in SIZES}
-    cpu: dict[int, list[float]] = {size: [] for size in SIZES}
+@dataclass(frozen=True, slots=True)
+class ChunkCost:
+    """Seconds that a chunk more adds to its frames, by the clock and of the processor."""
+
+    wall: float
+    cpu: float
+
+
+def measure(rounds: int) -> ChunkCost:
+    """The least of the rounds."""
+    found: dict[int, list[tuple[float, float]]] = {size: [] for size in SIZES}
     with tempfile.TemporaryDirectory() as folder:
         stage = Path(folder, "shot.usda")
         stage.write_text(STAGE)
         for number in range(rounds):
             for size in SIZES:
-                seconds = _rendered(stage, f"{folder}/{number}.{size}.#.exr", size)
-                wall[size].append(seconds[0])
-                cpu[size].append(seconds[1])
+                found[size].append(_rendered(stage, f"{folder}/{number}.{size}.#.exr", size))
     more = FRAMES // SIZES[0] - FRAMES // SIZES[1]
-    for name, found in (("wall", wall), ("processor", cpu)):
-        few, many = (min(found[size]) for size in reversed(SIZES))
-        print(f"{name}: {1e3 * (many - few) / more:.1f} ms a chunk more, {1e3 * few / FRAMES:.1f} ms a frame")
+    small, large = (map(min, zip(*found[size], strict=True)) for size in SIZES)
+    return ChunkCost(*((many - few) / more for many, few in zip(small, large, strict=True)))
 
 
 def _rendered(stage: Path, pattern: str, size: int) -> tuple[float, float]:
-    """Wall and processor seconds from the first frame's end to the last's: without the worker's start."""
+    """Wall seconds from the first frame's end to the last's, without the worker's start, and processor seconds."""
     frames = tuple(map(float, range(1, FRAMES + 1)))
-    settings, output = RenderSettings(size=(24, 16)), OutputSettings(patterns=(pattern,))
-    job = RenderJob(stage, frames, settings=settings, output=output, given=frozenset({"size"}))
+    settings = RenderSettings(size=(24, 16), shadows=False)
+    job = RenderJob(stage, frames, settings=settings, output=OutputSettings(patterns=(pattern,)))
     before = children_seconds()
     with LocalEngine(1, threads=1) as engine:
         for chunk in make_chunks([job], size):
@@ -57,4 +63,5 @@ def _rendered(stage: Path, pattern: str, size: int) -> tuple[float, float]:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 5)
+    cost = measure(int(sys.argv[1]) if len(sys.argv) > 1 else 5)
+    print(f"a chunk more: {1e3 * cost.wall:.1f} ms, {1e3 * cost.cpu:.1f} CPU-ms")
