@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
-STAGES, FRAMES, ROUNDS = 8, 10, 3
+STAGES, FRAMES, ROUNDS = 8, 24, 2
 STAGE = """#usda 1.0
 def Sphere "ball" {
     double3 xformOp:translate.timeSamples = { 1: (0, 0, 0), 40: (0, 1, 0) }
