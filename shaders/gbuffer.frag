@@ -71,10 +71,16 @@ float cosine_to_eye(vec3 normal) {
 #endif
 }
 
+// The interpolated normal; where opposite ones cancel out, against the view.
+vec3 unit_normal(float side) {
+    float length_squared = dot(normal_relative, normal_relative);
+    return length_squared > 0.0 ? normalize(normal_relative) : side * view.relative_from_camera[2].xyz;
+}
+
 void main() {
     Material material = with_display(authored, display_color);
     float side = gl_FrontFacing ? handedness : -handedness;
-    vec3 normal = normalize(normal_relative);
+    vec3 normal = unit_normal(side);
     Detail detail = detail_of(normal);
 #ifdef TEXTURES
     apply_textures(material, normal, position_relative, uv);

@@ -11,7 +11,8 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.measure.brdf import evaluate_brdf
 from defshade_cli.measure.furnace import dielectric, metal, seen_from
 from defshade_cli.measure.layouts import first_frame
-from defshade_cli.measure.stress.corners import Corner, all_corners
+from defshade_cli.measure.stress.corner import Corner
+from defshade_cli.measure.stress.corners import all_corners
 from defshade_cli.measure.stress.stage import StressStage
 from defshade_cli.measure.stress.table import summary
 from defshade_cli.measure.stress.verdict import BOUND, Verdict, judge

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 
-from defshade_cli.measure.stress.corners import Corner
+from defshade_cli.measure.stress.corner import Corner
 from defshade_cli.measure.stress.verdict import BOUND, Verdict
 
 _HEADER = """| family | corners | worst error | where | NaN and Inf | refused | past the bound |

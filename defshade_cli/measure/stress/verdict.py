@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.errors import DefshadeError
+from defshade_cli.errors import StageError
 from defshade_cli.measure.layouts import first_frame
 from defshade_cli.measure.reference import reference_radiance
-from defshade_cli.measure.stress.corners import Corner
+from defshade_cli.measure.stress.corner import Corner
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.settings import RenderSettings
@@ -20,6 +20,8 @@ from defshade_cli.settings import RenderSettings
 BOUND = 1e-3
 """Relative error that the float layout keeps wherever the exact value can be held in float32."""
 _FLOOR = 1e-3
+_LEAST = 1e5 * float(np.finfo(np.float32).tiny)
+"""Light before exposure that float32 holds, with what it is a product of: five digits above its least normal number."""
 _LAYERS = ("beauty", "depth", "normal", "position")
 
 
@@ -52,7 +54,7 @@ def judge(corner: Corner, pipeline: Pipeline, folder: Path) -> Verdict:
         scene = first_frame(path)
         plan = make_plan(scene, settings)
         film = pipeline.render(scene, plan)
-    except DefshadeError as error:
+    except StageError as error:
         return Verdict(corner, error=str(error))
     lights = [planned.light for planned in plan.lights]
     exact, covered = reference_radiance(pipeline.planes(scene, plan), plan.camera, lights)
@@ -60,7 +62,7 @@ def judge(corner: Corner, pipeline: Pipeline, folder: Path) -> Verdict:
     sampled = pipeline.render(scene, make_plan(scene, _sampled(settings))).layers["beauty"]
     shown = [image, sampled, *(film.layers[name][covered] for name in _LAYERS[1:])]
     odd = sum(int(np.count_nonzero(~np.isfinite(values))) for values in shown)
-    worst, where, lit = _worst(image, exact)
+    worst, where, lit = _worst(image, exact, plan.camera.exposure)
     return Verdict(corner, worst, where, odd, lit)
 
 
@@ -69,9 +71,9 @@ def _sampled(settings: RenderSettings) -> RenderSettings:
     return replace(settings, layers=("beauty",), samples=2, shadows=True, light_points=2)
 
 
-def _worst(image: NDArray[Any], exact: NDArray[np.float64]) -> tuple[float, tuple[int, int], int]:
+def _worst(image: NDArray[Any], exact: NDArray[np.float64], exposure: float) -> tuple[float, tuple[int, int], int]:
     level = exact.mean(axis=-1)
-    lit = level > _FLOOR * level.max(initial=0.0)
+    lit = level > max(_FLOOR * level.max(initial=0.0), _LEAST * max(1.0, exposure))
     if not lit.any():
         return 0.0, (0, 0), 0
     apart = np.abs(image.astype(np.float64) - exact).max(axis=-1)
