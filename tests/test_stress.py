@@ -51,6 +51,7 @@ def test_an_exception_is_still_one(pipeline: Pipeline, tmp_path: Path) -> None:
         (StressStage(surface="float inputs:ior = -2"), "ior (below 0)"),
         (StressStage(lights='def DomeLight "sky" {\nfloat inputs:intensity = inf\n}'), "inputs:intensity"),
         (StressStage(camera="float exposure = nan"), "exposure is not finite"),
+        (StressStage(camera="float fStop = 1e-20\nfloat focusDistance = 6"), "f_stop of 1e-20 is a lens"),
     ],
 )
 def test_what_is_not_finite_is_named(stage: StressStage, said: str, tmp_path: Path) -> None:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import ctypes
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from defshade_cli import render
-from defshade_cli.errors import GpuMemoryError
+from defshade_cli import render, resources
+from defshade_cli.errors import GpuError, GpuMemoryError
+from defshade_cli.gpu.context import Gpu
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.rendering import tiles
 from defshade_cli.scene.window import DataWindow
@@ -82,3 +86,32 @@ def test_narrow_images_are_drawn(size: tuple[int, int], scenes: Path) -> None:
     film = render(scenes / "gprims.usda", size=size)
     assert film.size == size
     assert np.isfinite(film.layers["beauty"]).all()
+
+
+def test_what_the_driver_fails_at_is_raised(gpu: Gpu) -> None:
+    """GL tells nobody: without the look at its error a wrong image would pass for a right one."""
+    with pytest.raises(GpuError, match="GL_INVALID_ENUM"), gpu.watched():
+        gpu._entry_point("glEnable", ctypes.c_uint)(0xFFFF)
+    with gpu.watched():
+        pass
+
+
+def test_memory_that_ends_amid_a_frame_is_told_as_such(gpu: Gpu) -> None:
+    """An address space that is full, as a device's memory may be: in a process of its own, which keeps the limit."""
+    script = """
+import resource
+from defshade_cli import render, resources
+from defshade_cli.errors import GpuError, GpuMemoryError
+from defshade_cli.gpu.context import Gpu
+render("SCENES/gprims.usda", size=(32, 18))
+held = int(open("/proc/self/status").read().partition("VmData:")[2].split()[0]) * 1024
+resource.setrlimit(resource.RLIMIT_DATA, (held + (64 << 20), -1))
+try:
+    render("SCENES/gprims.usda", size=(2000, 2000))
+except GpuMemoryError as error:
+    raise SystemExit(error.exit_code)
+"""
+    command = [sys.executable, "-c", script.replace("SCENES", str(resources.SCENES))]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert result.returncode == GpuMemoryError.exit_code, result.stderr[-2000:]
+    assert "the image is drawn in tiles of" in result.stderr

@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, ClassVar, Self, TypeVar
 
 import moderngl
 
-from defshade_cli.errors import GpuError
+from defshade_cli.errors import GpuError, GpuMemoryError
 from defshade_cli.gpu.shaders import ShaderLibrary
 
 INSTALL_HINT = "apt-get install --no-install-recommends libegl1 libgl1 libgl1-mesa-dri"
@@ -30,6 +30,7 @@ _TEXTURE_2D, _DEPTH_COMPONENT, _DEPTH_COMPONENT32F, _FLOAT = 0x0DE1, 0x1902, 0x8
 _TEXTURE_2D_ARRAY, _SRGB8_ALPHA8, _RGBA, _UNSIGNED_BYTE = 0x8C1A, 0x8C43, 0x1908, 0x1401
 _COLOR, _ZEROS = 0x1800, (ctypes.c_uint * 4)()
 DEPTH_CLAMP = 0x864F
+_NO_ERROR, _OUT_OF_MEMORY = "GL_NO_ERROR", "GL_OUT_OF_MEMORY"
 
 Releasable = TypeVar("Releasable", bound=Any)
 
@@ -93,6 +94,21 @@ class Gpu:
     def max_uniform_bytes(self) -> int:
         """Of one uniform block."""
         return int(self.context.info["GL_MAX_UNIFORM_BLOCK_SIZE"])
+
+    @contextmanager
+    def watched(self) -> Iterator[None]:
+        """What the driver fails at in the block is raised: GL itself goes on without a word, and the image is wrong.
+
+        Raises GpuMemoryError where memory ends, else GpuError.
+        """
+        self.make_current()
+        _ = self.context.error  # of what came before
+        try:
+            yield
+        except moderngl.Error as error:
+            raise _failure(self.context.error, str(error)) from error
+        if (told := self.context.error) != _NO_ERROR:
+            raise _failure(told, told)
 
     def keep(self, resource: Releasable) -> Releasable:
         """Release `resource` when this Gpu closes."""
@@ -173,6 +189,12 @@ def describe_devices(limit: int = 16) -> list[Device]:
                 devices.append(Device(index, "", "", "", False, str(error)))
             break
     return devices
+
+
+def _failure(code: str, reason: str) -> GpuError:
+    if code == _OUT_OF_MEMORY:
+        return GpuMemoryError(f"no memory is left on the device ({reason})")
+    return GpuError(f"the driver failed ({reason})")
 
 
 def _create_context(device: int | None) -> moderngl.Context:

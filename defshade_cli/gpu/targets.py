@@ -36,7 +36,7 @@ class Target:
 
     def release(self) -> None:
         """Free the framebuffer and its colour textures; a depth texture may be shared and is its maker's."""
-        self.framebuffer.release()
+        free(self.framebuffer)
         for texture in self.textures.values():
             texture.release()
 
@@ -65,6 +65,12 @@ def allocate(
     for texture in textures.values():
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
     return Target(framebuffer, textures, depth)
+
+
+def free(framebuffer: moderngl.Framebuffer) -> None:
+    """Unbound first: moderngl binds again what was bound once it has made another, which must not be gone by then."""
+    framebuffer.ctx.detect_framebuffer(0).use()
+    framebuffer.release()
 
 
 def _as_image(texture: moderngl.Texture, dtype: type, components: int) -> NDArray[Any]:

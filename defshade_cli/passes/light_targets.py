@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.targets import Target, allocate
+from defshade_cli.gpu.targets import Target, allocate, free
 from defshade_cli.plan import Plan
 
 Groups = tuple[str, ...]
@@ -46,7 +46,7 @@ class LightTargets:
         for target in self.sums.values():
             target.release()
         for framebuffer in self._framebuffers.values():
-            framebuffer.release()
+            free(framebuffer)
 
     def layers(self, counts: NDArray[np.int32]) -> dict[str, NDArray[np.float32]]:
         """(H, W, C) of each layer that is a sum. counts: (H, W, 1) samples that each pixel got."""

@@ -73,9 +73,9 @@ class Pipeline:
 
     def upload(self, scene: Scene, plan: Plan) -> DrawList:
         """The scene on the GPU, when all of it has arrived. Raises GpuError."""
-        self._gpu.make_current()
-        draws = self._resident(scene, plan)
-        self._gpu.context.finish()
+        with self._gpu.watched():
+            draws = self._resident(scene, plan)
+            self._gpu.context.finish()
         return draws
 
     def render(
@@ -85,12 +85,17 @@ class Pipeline:
         moments: Iterator[ShutterSample] | None = None,
         uploaded: DrawList | None = None,
     ) -> Film:
-        """The plan's layers. Raises GpuError.
+        """The plan's layers. Raises GpuError, GpuMemoryError where memory ends.
 
         moments: what samples see in turn, where the plan has motion blur; data layers show the scene itself.
         uploaded: of this scene, where that has been done before.
         """
-        self._gpu.make_current()
+        with self._gpu.watched():
+            return self._film(scene, plan, moments, uploaded)
+
+    def _film(
+        self, scene: Scene, plan: Plan, moments: Iterator[ShutterSample] | None, uploaded: DrawList | None
+    ) -> Film:
         draws = uploaded or self._resident(scene, plan)
         layers: Layers = {}
         manifests: Manifests = {}

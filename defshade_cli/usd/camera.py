@@ -32,6 +32,8 @@ MOST_CLIPPING_PLANES = 8
 _USABLE_CLIPPING = (1.0, 1.0e6)  # UsdGeomCamera's fallback
 _NEAREST = 1e-6  # near plane over far plane, where the authored one is not in front of the camera
 
+_WIDEST_LENS = 1e6  # diameters to the plane of focus, from where on float32 holds no view through it
+
 
 def find_cameras(stage: Usd.Stage) -> tuple[str, ...]:
     """Paths of every camera, those inside native instances included."""
@@ -77,7 +79,9 @@ def read_camera(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Camera, tuple[Unsup
         "focus_distance": gf.focusDistance,
         "shutter": (schema.GetShutterOpenAttr().Get(time), schema.GetShutterCloseAttr().Get(time)),
     }
-    odd = [name for name, value in lens.items() if not is_finite(value)]
+    odd = {name: "is not finite" for name, value in lens.items() if not is_finite(value)}
+    if not odd and 0.0 < _WIDEST_LENS * gf.fStop * gf.focusDistance < gf.focalLength:
+        odd["f_stop"] = f"of {gf.fStop:g} is a lens as wide as no view: nothing is out of focus"
     camera = Camera(
         path=path,
         world_from_camera=rigid(matrix(gf.transform)),
@@ -88,7 +92,7 @@ def read_camera(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Camera, tuple[Unsup
         clipping_planes=planes,
         **{name: value for name, value in lens.items() if name not in odd},
     )
-    return camera, (*issues, *(Unsupported(path, f"its {name} is not finite") for name in odd))
+    return camera, (*issues, *(Unsupported(path, f"its {name} {reason}") for name, reason in odd.items()))
 
 
 def framed_camera(bounds: NDArray[np.float64], up_axis: str) -> Camera:

@@ -43,7 +43,9 @@ def is_finite(value: object) -> bool:
 def are_finite(numbers: NDArray[Any]) -> bool:
     """Whether a contiguous array (...) is finite. Its squares' sum tells at once, unless that overflows."""
     flat = numbers.ravel()
-    return math.isfinite(np.dot(flat, flat)) or bool(np.isfinite(flat).all())
+    with np.errstate(over="ignore"):
+        told = math.isfinite(np.dot(flat, flat))
+    return told or bool(np.isfinite(flat).all())
 
 
 def integers(value: object) -> NDArray[np.integer] | None:

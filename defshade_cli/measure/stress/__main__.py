@@ -17,12 +17,14 @@ from defshade_cli.measure.stress.table import summary
 from defshade_cli.measure.stress.verdict import judge
 from defshade_cli.passes.pipeline import Pipeline
 
+LIGHTS = 100_000
+
 
 def main(page: Path) -> int:
     logging.getLogger("defshade").setLevel(logging.CRITICAL)
     with Gpu() as gpu, tempfile.TemporaryDirectory() as folder:
         pipeline = Pipeline(gpu)
-        verdicts = [judge(corner, pipeline, Path(folder)) for corner in all_corners()]
+        verdicts = [judge(corner, pipeline, Path(folder)) for corner in all_corners(LIGHTS)]
     page.write_text(replace_generated(page.read_text("utf-8"), "stress", summary(verdicts)), "utf-8")
     unsound = [v for v in verdicts if not v.is_sound]
     for v in unsound:

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from math import radians, tan
 
+import numpy as np
+
 from defshade_cli.measure.stress.corner import EXACT, SEEN, Corner
 from defshade_cli.measure.stress.pairs import pairs
 from defshade_cli.measure.stress.stage import StressStage, transformed
@@ -15,9 +17,14 @@ _GRAZING = "positions are float32 relative to the eye: 6 units off they are know
 _DISTANT = "positions are float32 relative to the eye: 2,000 units off they are known to 1e-4, 20,000 units off to 1e-3"
 
 
-def all_corners() -> list[Corner]:
+def all_corners(lights: int = 1000) -> list[Corner]:
+    """lights: that overlap in one corner."""
     alone = [corner for family in _FAMILIES for corner in family()]
-    return [*alone, *pairs(alone)]
+    return [
+        *alone,
+        *pairs(alone),
+        Corner("crowd", f"{lights:,} overlapping lights", StressStage(lights=_swarm(lights))),
+    ]
 
 
 def _surfaces() -> Iterator[Corner]:
@@ -101,9 +108,13 @@ def _cameras() -> Iterator[Corner]:
         "exposure -50": "float exposure = -50",
         "exposure nan": "float exposure = nan",
         "fStop 0.001": "float fStop = 0.001\nfloat focusDistance = 6",
+        "fStop 1e-20": "float fStop = 1e-20\nfloat focusDistance = 6",
+        "focus at 1e-20": "float fStop = 2\nfloat focusDistance = 1e-20",
+        "focus at 1e20": "float fStop = 2\nfloat focusDistance = 1e20",
+        "shutter 1e9": "double shutter:open = 0\ndouble shutter:close = 1e9",
     }.items():
         yield Corner("camera", name, StressStage(camera=text), EXACT)
-    for size in ((1, 1), (1, 1000), (1001, 1)):
+    for size in ((1, 1), (1, 1000), (1001, 1), (16384, 1)):
         yield Corner("camera", f"{size[0]}x{size[1]}", settings=replace(SEEN, size=size))
 
 
@@ -133,6 +144,10 @@ def _meshes() -> Iterator[Corner]:
         "no area": f"{triangle}\npoint3f[] points = [(-1, 0, 0), (0, 0, 0), (1, 0, 0), (2, 0, 0)]",
         "one point": f"{triangle}\npoint3f[] points = [(0, 0, 0), (0, 0, 0), (0, 0, 0), (0, 0, 0)]",
         "duplicate faces": f"{points}\nint[] faceVertexCounts = [4, 4]\nint[] faceVertexIndices = [0,1,2,3,0,1,2,3]",
+        "three at an edge": f"{points[:-1]}, (0, 0, 1)]\nint[] faceVertexCounts = [3, 3, 3]\n"
+        "int[] faceVertexIndices = [0, 2, 1, 0, 2, 3, 0, 2, 4]",
+        "no faces": f"{points}\nint[] faceVertexCounts = []\nint[] faceVertexIndices = []",
+        "nothing": "point3f[] points = []\nint[] faceVertexCounts = []\nint[] faceVertexIndices = []",
         "reversed twin": f"{points}\nint[] faceVertexCounts = [4, 4]\nint[] faceVertexIndices = [0,1,2,3,3,2,1,0]",
         "one index thrice": f"{points}\nint[] faceVertexCounts = [3, 4]\nint[] faceVertexIndices = [1,1,1,0,1,2,3]",
         "nan point": f"{triangle}\npoint3f[] points = [(-1, -1, 0), (1, nan, 0), (1, 1, 0), (-1, 1, 0)]",
@@ -151,8 +166,23 @@ def _meshes() -> Iterator[Corner]:
         "absurd counts": f"{points}\nint[] faceVertexCounts = [2147483647]\nint[] faceVertexIndices = [0, 1, 2, 3]",
         "counts of wrong type": f'{points}\nstring faceVertexCounts = "four"\nint[] faceVertexIndices = [0, 1, 2, 3]',
     }.items():
-        mesh = f'uniform token subdivisionScheme = "none"\n{text}'
-        yield Corner("mesh", name, StressStage(ball_kind="Mesh", ball=mesh))
+        for scheme, suffix in (("none", ""), ("catmullClark", ", subdivided")):
+            mesh = f'uniform token subdivisionScheme = "{scheme}"\n{text}'
+            yield Corner("mesh", name + suffix, StressStage(ball_kind="Mesh", ball=mesh))
+
+
+def _swarm(count: int) -> str:
+    """So many bulbs over the ball, as bright as one together."""
+    places = np.random.default_rng(1).uniform((-3.0, 1.5, -3.0), (3.0, 4.0, 3.0), (count, 3)).round(4)
+    return f"""def PointInstancer "swarm" {{
+        rel prototypes = </swarm/bulb>
+        int[] protoIndices = {[0] * count}
+        point3f[] positions = {list(map(tuple, places.tolist()))}
+        def SphereLight "bulb" {{
+            float inputs:intensity = {30.0 / count!r}
+            float inputs:radius = 0.2
+        }}
+    }}"""
 
 
 def _bulb(name: str, text: str, settings: RenderSettings = SEEN) -> Corner:
