@@ -18,7 +18,7 @@ _DISTANT = "positions are float32 relative to the eye: 2,000 units off they are 
 
 
 def all_corners(lights: int = 1000) -> list[Corner]:
-    """lights: that overlap in one corner."""
+    """The corners of all families, and their pairs. lights: that overlap in one of them."""
     alone = [corner for family in _FAMILIES for corner in family()]
     return [
         *alone,
