@@ -9,11 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import settings
 
 from defshade_cli import resources
 
 if TYPE_CHECKING:
     from defshade_cli.gpu.context import Gpu
+
+settings.register_profile("steady", deadline=None)  # a busy machine is no fault of an example's
+settings.load_profile("steady")
 
 ROOT = Path(__file__).resolve().parent.parent
 

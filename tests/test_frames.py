@@ -64,6 +64,16 @@ def test_endless_range_is_refused_before_it_is_built() -> None:
         parse_frames("0:1000000000000")
 
 
+@given(st.text(alphabet="0123456789-:x,. e+af", max_size=12))
+def test_any_text_is_frames_or_refused(text: str) -> None:
+    try:
+        frames = parse_frames(text)
+    except UsageError:
+        return
+    assert 0 < len(frames) <= MOST_FRAMES
+    assert all(math.isfinite(frame) for frame in frames)
+
+
 numbers = st.integers(-4000, 4000).map(lambda quarters: quarters / 4)
 
 

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from defshade_cli.image.environment import sky_of
-from defshade_cli.image.projections import latlong_from
+from defshade_cli.image.projections import _on_ball, _on_disc, latlong_from
 from defshade_cli.scene.environment import SkyLayout
 from defshade_cli.scene.light import DomeLight
 from stages import read, reasons
 
 SIZE = 96
+Place = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
 
 
 def directions(height: int) -> NDArray[np.float64]:
@@ -75,6 +79,30 @@ def test_every_direction_is_where_the_layout_shows_it(image: NDArray[np.float32]
     known = d[..., 2] > -0.9 if layout != "cubeMapVerticalCross" else np.ones(d.shape[:2], bool)
     np.testing.assert_allclose(sky[known], colours(d)[known], atol=0.05)
     np.testing.assert_allclose(sky.mean(axis=(0, 1)), colours(d).mean(axis=(0, 1)), atol=0.02)
+
+
+coordinates = st.floats(-1.0, 1.0)
+
+
+@pytest.mark.parametrize("place_of", [_on_ball, _on_disc])
+@given(coordinates, coordinates, coordinates)
+def test_any_direction_has_its_place_in_the_disc(place_of: Place, x: float, y: float, z: float) -> None:
+    """And another place is another direction: the way back gives it again."""
+    d = np.array((x, y, z))
+    length = float(np.linalg.norm(d))
+    if length < 1e-3 or z < -0.999 * length:  # the rim is one direction
+        return
+    d = d / length
+    u, v = place_of(d)
+    across, up = 2.0 * float(u) - 1.0, 1.0 - 2.0 * float(v)
+    assert across**2 + up**2 <= 1.0 + 1e-9
+    if place_of is _on_ball:
+        normal = np.array((across, up, np.sqrt(max(1.0 - across**2 - up**2, 0.0))))
+        back = 2.0 * normal[2] * normal - np.array((0.0, 0.0, 1.0))
+    else:
+        turn, r = np.arctan2(up, across), np.pi * np.hypot(across, up)
+        back = np.array((np.sin(r) * np.cos(turn), np.sin(r) * np.sin(turn), np.cos(r)))
+    np.testing.assert_allclose(back, d, atol=1e-6)
 
 
 def test_automatic_tells_a_cross_by_its_shape() -> None:
