@@ -5,16 +5,19 @@ A worker process renders case after case, with its libraries loaded and its cont
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from defshade_cli.farm.limits import Limits
-from defshade_cli.farm.local import LocalEngine
+from defshade_cli.farm.local import LocalEngine, core_count
 from defshade_cli.farm.tasks import Chunk, Outcome
 from defshade_cli.measure.fuzz.corpus import Case, Corpus
 from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
 
-LIMITS = Limits(memory=2048, seconds=10.0)
+_SECONDS = 10.0
+LIMITS = Limits(memory=2048, seconds=_SECONDS)
 _SETTINGS = RenderSettings(size=(32, 18))
 
 FAULTS = ("bug", "hang", "memory", "a file outside")
@@ -25,13 +28,31 @@ def fuzz(numbers: Iterable[int], seed: int, folder: Path) -> Iterator[tuple[int,
     """Each number with its case, what became of it, and the verdict."""
     corpus, out = Corpus(folder / "stages"), folder / "out"
     output = OutputSettings((str(out / "image.exr"),))
-    with LocalEngine(1, threads=1, limits=LIMITS, log_level="CRITICAL") as engine:
+    with _engine(LIMITS) as engine:
         for number in numbers:
             case = corpus.case(number, seed)
+            job = RenderJob(case.stage, settings=_SETTINGS, output=output)
             before = _listing(folder, out)
-            engine.submit(Chunk(RenderJob(case.stage, settings=_SETTINGS, output=output)))
-            (outcome,) = engine.outcomes()
+            outcome = _outcome(engine, job)
+            if verdict(outcome, strayed=False) == "hang" and (busy := _busy()) > 1.0:
+                with _engine(replace(LIMITS, seconds=_SECONDS * busy)) as patient:
+                    outcome = _outcome(patient, job)
             yield number, case, outcome, verdict(outcome, strayed=_listing(folder, out) != before)
+
+
+def _engine(limits: Limits) -> LocalEngine:
+    return LocalEngine(1, threads=1, limits=limits, log_level="CRITICAL")
+
+
+def _outcome(engine: LocalEngine, job: RenderJob) -> Outcome:
+    engine.submit(Chunk(job))
+    (outcome,) = engine.outcomes()
+    return outcome
+
+
+def _busy() -> float:
+    """How many processes want each core: ten seconds of a machine that is shared are fewer of its time."""
+    return os.getloadavg()[0] / core_count()
 
 
 def _listing(folder: Path, without: Path) -> set[Path]:
