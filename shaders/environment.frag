@@ -20,7 +20,7 @@ float share(float roughness) {
 #ifdef ANALYTIC
     return 1.0;
 #else
-    return sharpness(roughness, view.pixel_share);
+    return sharpness(roughness, view.sky_share);
 #endif
 }
 

@@ -5,6 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from defshade_cli.passes.sampling import owen_sobol
+from defshade_cli.scene.distribution import GridDistribution
 from defshade_cli.scene.environment import Environment, harmonics, uniform_environment
 
 
@@ -26,8 +28,22 @@ def test_the_mean_of_samples_is_the_integral(sky: Environment) -> None:
     directions, weights = drawn(sky)
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0, rtol=1e-12)
     np.testing.assert_allclose(weights.mean(0), 4 * math.pi, rtol=2e-3)
-    expected = 0.0 if len(sky.radiance) == 8 else 4 * math.pi / 3
+    expected = 0.0 if np.ptp(sky.radiance) == 0.0 else 4 * math.pi / 3
     np.testing.assert_allclose((weights * directions[:, 1:2]).mean(0), expected, rtol=1e-2, atol=0.05)
+
+
+def test_directions_by_any_density_have_the_same_mean() -> None:
+    sky = Environment(np.random.default_rng(1).random((8, 16, 3)))
+    density = GridDistribution(np.random.default_rng(2).random((8, 16)) + 0.1)
+    drawn = [[sky.sample(owen_sobol(i, 3), by)[1] for i in range(4096)] for by in (None, density)]
+    np.testing.assert_allclose(np.mean(drawn[0], axis=0), np.mean(drawn[1], axis=0), rtol=5e-3)
+
+
+def test_cells_hold_the_directions_that_are_drawn_from_them() -> None:
+    sky = Environment(np.eye(3)[np.arange(8 * 16).reshape(8, 16) % 3])
+    directions, radiance, extents = zip(*(sky.sample(owen_sobol(i, 5)) for i in range(64)), strict=True)
+    cells = sky.cell_of(np.array(directions))
+    np.testing.assert_allclose(sky.radiance[cells], np.array(radiance) / np.array(extents)[:, None], rtol=1e-6)
 
 
 def test_a_sun_is_found_where_it_stands() -> None:

@@ -14,8 +14,8 @@ from defshade_cli.image.environment import sky_of
 from defshade_cli.passes.sampling import Sample, samples
 from defshade_cli.passes.shadow_atlas import AtlasRoom
 from defshade_cli.passes.shadow_cameras import ShadowExtent, shadow_cameras
+from defshade_cli.passes.sky_guide import NO_GUIDES, SkyGuides
 from defshade_cli.plan import Plan, PlannedLight
-from defshade_cli.plan.shadow_maps import DOME_DIRECTIONS
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.emission import Emitter, emitter_at, far_field, sky_emitter
 from defshade_cli.scene.light import DomeLight, RectLight
@@ -34,13 +34,13 @@ class LitSample:
     shadow_cameras: tuple[Camera, ...]
 
 
-def light_batches(scene: Scene, plan: Plan, sample: Sample) -> Iterator[list[LitSample]]:
+def light_batches(scene: Scene, plan: Plan, sample: Sample, guides: SkyGuides = NO_GUIDES) -> Iterator[list[LitSample]]:
     """All of the plan's lights in order, in runs whose shadow maps fit the atlas together."""
     extent = shadow_extent(scene.bounds - plan.camera.position, plan)
     batch: list[LitSample] = []
     room = AtlasRoom(plan.shadow_resolution)
     for number, planned in enumerate(plan.lights):
-        for emitter in _emitters(number, planned, plan, sample, extent):
+        for emitter in _emitters(number, planned, plan, sample, extent, guides):
             lit = _lit_sample(planned, emitter, plan, extent)
             if not room.holds(len(lit.shadow_cameras)):
                 yield batch
@@ -51,14 +51,15 @@ def light_batches(scene: Scene, plan: Plan, sample: Sample) -> Iterator[list[Lit
         yield batch
 
 
-def _emitters(number: int, planned: PlannedLight, plan: Plan, sample: Sample, extent: ShadowExtent) -> list[Emitter]:
+def _emitters(
+    number: int, planned: PlannedLight, plan: Plan, sample: Sample, extent: ShadowExtent, guides: SkyGuides
+) -> list[Emitter]:
     """One for most lights; some directions for a dome, and none where its analytic term stands in for them."""
     light = planned.light
     if isinstance(light, DomeLight):
-        if plan.samples == 1:
-            return []
-        places = [sample.on_light(number, k, DOME_DIRECTIONS) for k in range(DOME_DIRECTIONS)]
-        directions = [sky_emitter(light, sky_of(light), u[:2], 1.0 / DOME_DIRECTIONS) for u in places]
+        count = planned.points
+        places = [sample.on_light(number, k, count) for k in range(count)]
+        directions = [sky_emitter(light, sky_of(light), u[:2], 1.0 / count, guides.get(light)) for u in places]
         return [direction.shared_by(plan.samples) for direction in directions]
     if plan.samples * planned.points == 1:
         return [far_field(light)]

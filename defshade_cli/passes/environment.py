@@ -1,8 +1,8 @@
-"""The environment pass: what domes show behind the geometry, and in a frame of one sample their light on it.
+"""The environment pass: what domes show behind the geometry, and their light on it where no directions stand for them.
 
-With more samples, directions drawn from the sky light the geometry like distant lights, with shadows
-(passes/emitters.py); this pass then draws the background, and the sky's image in lobes too sharp for them, as far as
-geometry leaves it open (passes/sky_visibility.py).
+Directions drawn from the sky light the geometry like distant lights, with shadows (passes/emitters.py); this pass then
+draws the background, and the sky's image in lobes too sharp for them, as far as geometry leaves it open
+(passes/sky_visibility.py). A frame of one sample and one point a light has no directions.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class EnvironmentVariant:
     def of(cls, plan: Plan, dome: PlannedLight) -> EnvironmentVariant:
         """What the shader of a dome must know of the plan."""
         orthographic = plan.camera.projection == "orthographic"
-        shows = plan.samples == 1, plan.background, plan.hides_sky(dome)
+        shows = dome.points == 0, plan.background, plan.hides_sky(dome)
         return cls(plan.planes, plan.layout, orthographic, *shows, plan.outputs, plan.most_groups, plan.render_space)
 
     @property

@@ -31,6 +31,7 @@ from defshade_cli.passes.sampling import CENTRE, Sample, samples
 from defshade_cli.passes.screen import WHOLE, Screen, TileMask
 from defshade_cli.passes.shadow_atlas import ShadowAtlas
 from defshade_cli.passes.shadows import ShadowPass, ShadowVariant
+from defshade_cli.passes.sky_guide import NO_GUIDES, SkyGuides, scout, sky_guides
 from defshade_cli.passes.sky_visibility import SkyVisibility, SkyVisibilityPass
 from defshade_cli.passes.stopping import Stopping
 from defshade_cli.passes.tables import LightTables, TableStore
@@ -49,7 +50,7 @@ class Pipeline:
         self._gpu = gpu
         gpu.make_current()
         self._scene = GpuScene(gpu)
-        self._frame = Frame(gpu)
+        self._frame, self._scouted = Frame(gpu), Frame(gpu)
         self._view = RecordBuffer(gpu, VIEW)
         self._lights = RecordBuffer(gpu, LIGHTS)
         self._motions = RecordBuffer(gpu, MOTIONS)
@@ -138,6 +139,7 @@ class Pipeline:
     ) -> tuple[Layers, Manifests, Sampling]:
         """What is a mean over samples or tells of them, and what ids in it stand for."""
         mattes = Mattes(scene, plan)
+        guides = self._guides(draws, plan)
         gbuffer = self._frame.gbuffer(plan.size, plan.planes, plan.layout)
         radiance = self._frame.radiance("sample", plan.size, gbuffer)
         targets = self._frame.light_targets(radiance, plan)
@@ -156,7 +158,7 @@ class Pipeline:
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             if plan.mattes:
                 mattes.add(gbuffer.target.read("visible"))
-            self._light(draws, scene, plan, sample, tables, gbuffer, targets, visibility)
+            self._light(draws, scene, plan, sample, tables, gbuffer, targets, visibility, guides)
             self._accumulation.add(radiance)
             if self._stopping.is_over(self._accumulation):
                 break
@@ -179,6 +181,7 @@ class Pipeline:
         gbuffer: GBuffer,
         targets: LightTargets,
         visibility: SkyVisibility | None,
+        guides: SkyGuides,
     ) -> None:
         """One sample of every light: as many at a time as the shadow atlas holds; then the skies, seen as they let."""
         variant = LightingVariant.of(plan)
@@ -188,7 +191,7 @@ class Pipeline:
         openness = self._sky_visibility_pass(variant) if visibility else None
         if openness and visibility:
             openness.begin_sample(visibility)
-        for batch in light_batches(scene, plan, sample) if plan.lit else ():
+        for batch in light_batches(scene, plan, sample, guides) if plan.lit else ():
             shadows = self._shadow_maps(draws, batch, plan, sample, tables) if plan.shadows else None
             lights, emitters = [lit.planned for lit in batch], [lit.emitter for lit in batch]
             records = light_records(lights, emitters, plan.camera.position, shadows, tables)
@@ -203,6 +206,14 @@ class Pipeline:
             environment = self._environment_pass(EnvironmentVariant.of(plan, dome))
             first_link = tables.links.lights.get(dome.light, ALL_LINKED)
             environment.draw(dome, gbuffer, targets, visibility, first_link)
+
+    def _guides(self, draws: DrawList, plan: Plan) -> SkyGuides:
+        """Where in its domes' skies the image looks for light, if samples are drawn there."""
+        if not any(dome.points for dome in plan.domes):
+            return NO_GUIDES
+        self._mask.hide(WHOLE[:0])
+        small = scout(plan)
+        return sky_guides(self._drawn_planes(draws, plan.planes, small, self._scouted), small)
 
     def _volumes(self, draws: DrawList, plan: Plan, tables: LightTables, gbuffer: GBuffer) -> NDArray[np.float32]:
         """The light volumes as the pixels' centres see them, domes apart."""
@@ -242,8 +253,10 @@ class Pipeline:
             planes |= self._drawn_planes(draws, plan.data_planes[first : first + MOST_TARGETS], plan)
         return planes
 
-    def _drawn_planes(self, draws: DrawList, planes: tuple[Plane, ...], plan: Plan) -> Planes:
-        gbuffer = self._frame.gbuffer(plan.size, planes, "float")
+    def _drawn_planes(
+        self, draws: DrawList, planes: tuple[Plane, ...], plan: Plan, frame: Frame | None = None
+    ) -> Planes:
+        gbuffer = (frame or self._frame).gbuffer(plan.size, planes, "float")
         self._draw_gbuffer(draws, plan, gbuffer, CENTRE)
         return read_planes(gbuffer, planes, plan)
 

@@ -61,18 +61,18 @@ def _primvar_values(name: str, planes: Planes, plan: Plan, scene: Scene) -> NDAr
 def _layer_values(layer: Layer, planes: Planes, camera: Camera) -> NDArray[Any]:
     match layer.name:
         case "distance":
-            return np.linalg.norm(_camera_positions(planes["depth"], camera), axis=-1, keepdims=True)
+            return np.linalg.norm(camera_positions(planes["depth"], camera), axis=-1, keepdims=True)
         case "position":
-            return transform_points(camera.world_from_camera, _camera_positions(planes["depth"], camera))
+            return transform_points(camera.world_from_camera, camera_positions(planes["depth"], camera))
         case "Peye":
-            return _camera_positions(planes["depth"], camera)
+            return camera_positions(planes["depth"], camera)
         case "Neye":
             return transform_directions(camera.camera_from_world, planes["normal"][..., :3])
         case _:
             return planes[layer.source][..., layer.first : layer.first + len(layer.channels)]
 
 
-def _camera_positions(depth: NDArray[np.float32], camera: Camera) -> NDArray[np.float64]:
+def camera_positions(depth: NDArray[np.float32], camera: Camera) -> NDArray[np.float64]:
     """(height, width, 3) camera-space points at the pixels' centres; 0 on the background."""
     height, width = depth.shape[:2]
     left, right, bottom, top = camera.window

@@ -33,6 +33,7 @@ def view_record(plan: Plan, layout: Layout, sample: Sample = CENTRE) -> NDArray[
     view["size"], view["origin"] = plan.size, plan.window.origin
     view["exposure"] = plan.exposure
     view["sample_index"] = sample.index
+    view["sky_share"] = plan.sky_share
     view["pixel_share"] = 1.0 / plan.samples if plan.samples > 1 else 0.0
     return view
 

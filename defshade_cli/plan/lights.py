@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from defshade_cli.image.light_texture import with_texture
 from defshade_cli.plan.groups import group_lights, light_groups, light_outputs
 from defshade_cli.plan.overlap import reaches_into_ball
-from defshade_cli.plan.points import apparent_size, share_points
+from defshade_cli.plan.points import apparent_size, points_of, share_points
 from defshade_cli.scene.light import DistantLight, Light, SphereLight
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
@@ -79,7 +79,7 @@ def plan_lights(
             number=number,
             is_empty=_is_empty(light, scene),
             groups=of_light,
-            points=count,
+            points=points_of(light, count, settings),
         )
         for (number, light), of_light, count in zip(lit, groups, points, strict=True)
     ]

@@ -179,10 +179,16 @@ class Plan:
         """Those of the lights that are skies."""
         return tuple(planned for planned in self.lights if isinstance(planned.light, DomeLight))
 
+    @property
+    def sky_share(self) -> float:
+        """Of a dome, that one of its directions stands for, four times; 0 where it has none but its analytic term."""
+        directions = max((dome.points for dome in self.domes), default=0) * self.samples
+        return 4.0 / directions if directions else 0.0
+
     def hides_sky(self, planned: PlannedLight) -> bool:
-        """Is it a dome whose image in sharp lobes geometry hides, as far as samples tell?"""
+        """Is it a dome that geometry hides, as far as the directions drawn so far tell?"""
         casts = self.shadows and planned.light.casts_shadow
-        return isinstance(planned.light, DomeLight) and self.samples > 1 and casts
+        return isinstance(planned.light, DomeLight) and planned.points > 0 and casts
 
     @property
     def shadow_styles(self) -> bool:

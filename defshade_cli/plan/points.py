@@ -13,11 +13,24 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.scene.light import Light
+from defshade_cli.scene.light import DomeLight, Light
 from defshade_cli.settings import RenderSettings
 
 _SMALL, _MIDDLING = 0.03, 0.12
 """Radius over distance: up to the first one point does, up to the second a quarter of the largest lights' number."""
+
+
+_SKY_DIRECTIONS, _FOR_EACH_POINT = 4, 8
+"""Of a dome: in a sample, and in all samples together for each point of a large light; at least."""
+
+
+def points_of(light: Light, shared: int, settings: RenderSettings) -> int:
+    """A sample's points of a light, `shared` among most; of a dome directions, 0 where its analytic term does."""
+    if not isinstance(light, DomeLight):
+        return shared
+    if settings.most_samples * settings.light_points == 1:
+        return 0
+    return max(_power_of_two(_FOR_EACH_POINT * settings.light_points / settings.most_samples), _SKY_DIRECTIONS)
 
 
 def apparent_size(light: Light, bounds: NDArray[np.float64]) -> float:

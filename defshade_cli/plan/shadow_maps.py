@@ -14,13 +14,13 @@ from defshade_cli.scene.light import DomeLight
 FINEST, COARSEST = 1024, 128
 """Texels along the side of a map."""
 
-DOME_DIRECTIONS = 4
-"""Directions of a dome in one sample, each with a shadow map of its own."""
-
 _TEXELS = 64 * FINEST**2
 """Of all maps of a sample."""
 
 _CUBE_FACES = 6
+
+_SKY_MAPS = 4
+"""Of a dome, that count: more of them are drawn in turn, and are as fine."""
 
 
 def shadow_resolution(maps: float) -> int:
@@ -34,5 +34,5 @@ def count_maps(planned: PlannedLight) -> int:
     if not planned.light.casts_shadow:
         return 0
     if isinstance(planned.light, DomeLight):
-        return DOME_DIRECTIONS
+        return min(planned.points, _SKY_MAPS)
     return planned.points * (1 if planned.light.is_infinite else _CUBE_FACES)

@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.scene.distribution import GridDistribution
 from defshade_cli.scene.environment import Environment
 from defshade_cli.scene.light import (
     CylinderLight,
@@ -111,9 +112,11 @@ def emitter_at(light: Light, u: Place, towards: Vector, *, inside: bool = True) 
     return Emitter(position, light.axis, normalize(cofactor), "cosine", intensity, patch.area * stretch)
 
 
-def sky_emitter(light: DomeLight, sky: Environment, u: tuple[float, float], share: float) -> Emitter:
-    """A direction of the dome drawn by its sky's radiance, bearing `share` of the whole."""
-    direction, weight, extent = sky.sample(u)
+def sky_emitter(
+    light: DomeLight, sky: Environment, u: tuple[float, float], share: float, density: GridDistribution | None = None
+) -> Emitter:
+    """A direction of the dome drawn by its sky's radiance, or by a `density`, bearing `share` of the whole."""
+    direction, weight, extent = sky.sample(u, density)
     axis = -normalize(light.world_from_light[:3, :3] @ direction)
     return Emitter(light.position, axis, axis, "uniform", light.emission * weight * share, extent * share)
 

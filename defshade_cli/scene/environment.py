@@ -38,13 +38,15 @@ class Environment:
     def __post_init__(self) -> None:
         object.__setattr__(self, "radiance", frozen(self.radiance, np.float32, *self.radiance.shape[:2], 3))
 
-    def sample(self, u: tuple[float, float]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """A direction (3,) drawn in proportion to luminance, the radiance there over its density, (3,), and 1 over it.
+    def sample(
+        self, u: tuple[float, float], density: GridDistribution | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        """A direction (3,) drawn by luminance or a `density` of cells, the radiance there over it, (3,), and 1 over it.
 
         The mean of the second over samples is the integral of the radiance over all directions; black skies give 0.
         The third is in steradians: the part of the sky that a single direction stands for.
         """
-        row, column, down, right, chance = self._distribution.draw(u)
+        row, column, down, right, chance = (density or self._distribution).draw(u)
         sine = self._sines[row] + (self._sines[row + 1] - self._sines[row]) * down
         longitude = self._longitudes[column] + (self._longitudes[column + 1] - self._longitudes[column]) * right
         cosine = math.sqrt(max(1.0 - sine * sine, 0.0))
@@ -99,12 +101,29 @@ class Environment:
 
     @cached_property
     def _distribution(self) -> GridDistribution:
-        return GridDistribution(np.maximum(self._cells @ LUMINANCE, 0.0) * self._solid_angles)
+        return GridDistribution(self.power)
+
+    @cached_property
+    def luminance(self) -> NDArray[np.float64]:
+        """(h, w) of the cells."""
+        return np.maximum(self._cells @ LUMINANCE, 0.0)
+
+    @cached_property
+    def power(self) -> NDArray[np.float64]:
+        """(h, w) luminance times solid angle of the cells."""
+        return self.luminance * self._solid_angles
+
+    def cell_of(self, directions: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rows and columns of the cells that unit vectors (N, 3) point to."""
+        rows = np.searchsorted(-self._sines, -directions[:, 1]) - 1
+        columns = np.searchsorted(-self._longitudes, -np.arctan2(directions[:, 0], directions[:, 2])) - 1
+        height, width = self.luminance.shape
+        return np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
 
 
 def uniform_environment() -> Environment:
-    """Radiance 1 from everywhere."""
-    return Environment(np.ones((8, 16, 3), np.float32))
+    """Radiance 1 from everywhere, in cells that are fine enough to tell directions apart."""
+    return Environment(np.ones((64, 128, 3), np.float32))
 
 
 def harmonics(directions: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -50,9 +50,9 @@ vec3 lobe_response(Light light, Surface s) {
 #ifdef SKY
     if (light.is_sky == 0u) return response;
 #ifdef PLANE_CLEARCOAT
-    response.z *= 1.0 - sharpness(s.clearcoat_roughness, view.pixel_share);
+    response.z *= 1.0 - sharpness(s.clearcoat_roughness, view.sky_share);
 #endif
-    response.y *= 1.0 - sharpness(s.roughness, view.pixel_share);
+    response.y *= 1.0 - sharpness(s.roughness, view.sky_share);
 #endif
     return response;
 }

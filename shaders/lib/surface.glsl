@@ -36,8 +36,8 @@ void set_metallic_fresnel(inout Surface s, float dielectric_f0) {
 
 // 1 for lobes too narrow for the directions of a sky, four a sample, to find; 0 for wide ones. A lobe's solid angle goes
 // by the fourth power of its roughness, so that any of them is found by enough samples.
-float sharpness(float roughness, float pixel_share) {
-    float narrowest = sqrt(sqrt(16.0 * pixel_share));
+float sharpness(float roughness, float sky_share) {
+    float narrowest = sqrt(sqrt(16.0 * sky_share));
     return 1.0 - smoothstep(0.25 * narrowest, 0.45 * narrowest, roughness);
 }
 

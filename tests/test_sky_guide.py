@@ -1,0 +1,46 @@
+"""Directions of a sky are drawn where the image looks for light."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from build import camera, quad, rotated, scene
+from defshade_cli.gpu.context import Gpu
+from defshade_cli.passes.pipeline import Pipeline
+from defshade_cli.passes.sampling import owen_sobol
+from defshade_cli.passes.sky_guide import scout, sky_guides
+from defshade_cli.plan import make_plan
+from defshade_cli.scene.environment import uniform_environment
+from defshade_cli.scene.light import DomeLight
+from defshade_cli.scene.material import Material
+from defshade_cli.scene.scene import Scene
+from defshade_cli.settings import RenderSettings
+
+MIRROR = Material("/mirror", diffuse_color=(1, 1, 1), metallic=1.0, roughness=0.05)
+SKY = DomeLight(path="/sky", world_from_light=rotated("y", 70.0), color=(1, 1, 1))
+
+
+@pytest.fixture(scope="module")
+def pipeline(gpu: Gpu) -> Pipeline:
+    return Pipeline(gpu)
+
+
+def directions(pipeline: Pipeline, of: Scene) -> np.ndarray:
+    """(1024, 3) world space."""
+    plan = scout(make_plan(of, RenderSettings(size=(64, 64), samples=4)))
+    density = sky_guides(pipeline.planes(of, plan), plan)[SKY]
+    drawn = [uniform_environment().sample(owen_sobol(i, 1), density)[0] for i in range(1024)]
+    return np.array(drawn) @ SKY.world_from_light[:3, :3].T
+
+
+def test_a_mirror_looks_back_at_the_camera(pipeline: Pipeline) -> None:
+    """Of 85 %, for it has no diffuse, 50 are the sky's own and 35 lie where the wall mirrors a narrow view."""
+    of = scene([quad(5.0)], [SKY], [MIRROR], camera(5.0, 0.1))
+    backwards = directions(pipeline, of)[:, 2] > np.cos(np.radians(25.0))
+    assert backwards.mean() == pytest.approx(35 / 85 + 50 / 85 * 0.5 * (1.0 - np.cos(np.radians(25.0))), abs=0.05)
+
+
+def test_a_matte_wall_looks_at_its_half_of_the_sky(pipeline: Pipeline) -> None:
+    of = scene([quad(5.0)], [SKY], [replace(MIRROR, metallic=0.0)], camera(5.0, 0.1))
+    assert (directions(pipeline, of)[:, 2] > 0.0).mean() > 0.7
