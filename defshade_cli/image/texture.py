@@ -106,7 +106,7 @@ def resized(image: TexelImage, size: tuple[int, int]) -> TexelImage:
 
 
 def world_to_screen(file: ImageFile) -> Matrix | None:
-    """scene.texture.SeenFrom by the image's header. Raises OSError with the reason."""
+    """(4, 4): scene.texture.SeenFrom by the image's header. Raises OSError with the reason."""
     with _opened(file) as image:
         values = np.ravel(image.spec().getattribute("worldtoscreen") or ())
     return values.astype(np.float64).reshape(4, 4) if values.size == 16 and values.dtype.kind in "fi" else None

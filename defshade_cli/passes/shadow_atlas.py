@@ -43,6 +43,7 @@ class AtlasRoom:
         return maps <= self._slots and (maps != 1 or self._records > 0)
 
     def take(self, maps: int) -> None:
+        """Take room for a light with as many maps."""
         self._slots -= maps
         self._records -= maps == 1
 
