@@ -121,7 +121,7 @@ def test_inputs_vary_over_time() -> None:
 def test_values_of_another_type_are_converted_or_reported() -> None:
     assert of_cube(surface("m", "float inputs:diffuseColor = 0.5")).diffuse_color == (0.5, 0.5, 0.5)
     assert of_cube(surface("m", "double inputs:roughness = 0.25")).roughness == 0.25
-    assert issues(surface("m", 'string inputs:roughness = "shiny"')) == ["not read: roughness (str)"]
+    assert issues(surface("m", 'string inputs:roughness = "shiny"')) == ["without roughness (str)"]
 
 
 # What computes an input
@@ -199,7 +199,7 @@ def test_display_color_leaves_the_opacity_alone() -> None:
 def test_a_texture_falls_back_channel_by_channel() -> None:
     text = surface("m", FROM_TEXTURE, TEXTURE.format(fallback="float4 inputs:fallback = (1, 0.25, 0, 1)"))
     assert of_cube(text) == Material("/m", diffuse_color=(1, 0.25, 0), roughness=0.25)
-    assert issues(text) == ["not read: diffuseColor (no file wood.png), roughness (no file wood.png)"]
+    assert issues(text) == ["without diffuseColor (no file wood.png), roughness (no file wood.png)"]
 
 
 def test_a_texture_without_fallback_leaves_the_schemas_default() -> None:

@@ -93,15 +93,15 @@ def read_material(
     if identifier == _PREVIEW_SURFACE:
         inputs = _read_inputs(shader, network, () if occlusion else _WITHOUT_EFFECT)
         material = Material(shown_as, **_sound(inputs.values, inputs.left_out), inputs=inputs.textures)
-        reason, left_out = "not read", inputs.left_out
+        reason, left_out = "without", inputs.left_out
     elif identifier in MODELS:
         translation = translate(shader, identifier, network, occlusion=occlusion)
-        reason, left_out = f"lost of {identifier}", list(translation.lost)
+        reason, left_out = f"lost of {identifier}:", list(translation.lost)
         material = Material(shown_as, **_sound(translation.values, left_out), inputs=translation.textures)
     else:
         return not_understood(shown_as, _surface_named(prim, shader, identifier))
     left_out.extend(f"textures at primvar {name}" for name in material.uv_names[UV_SETS:])
-    issues = (Unsupported(shown_as, f"{reason}: {', '.join(left_out)}"),) if left_out else ()
+    issues = (Unsupported(shown_as, f"{reason} {', '.join(left_out)}"),) if left_out else ()
     return ReadMaterial(material, time_varying=network.time_varying, issues=issues)
 
 

@@ -147,7 +147,7 @@ class StageReader:
     def _tell(self, issues: Iterable[Unsupported]) -> None:
         """Log what the picture lacks, or shows otherwise than authored, when it is first met."""
         if new := [issue for issue in issues if issue not in self._told]:
-            log.warning("not as authored: %s", by_reason(new))
+            log.warning("not drawn as authored: %s", by_reason(new))
             self._told.update(new)
 
     def _moment(self, scene: Scene, frame: float, levels: dict[str, int]) -> Moment:
