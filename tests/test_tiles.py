@@ -113,5 +113,7 @@ except GpuMemoryError as error:
 """
     command = [sys.executable, "-c", script.replace("SCENES", str(resources.SCENES))]
     result = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    if "LLVM ERROR" in result.stderr:
+        pytest.skip("memory ended in llvmpipe's compiler first, which ends the process")
     assert result.returncode == GpuMemoryError.exit_code, result.stderr[-2000:]
     assert "the image is drawn in tiles of" in result.stderr
