@@ -105,7 +105,7 @@ from defshade_cli.errors import GpuError, GpuMemoryError
 from defshade_cli.gpu.context import Gpu
 render("SCENES/gprims.usda", size=(32, 18))
 held = int(open("/proc/self/status").read().partition("VmData:")[2].split()[0]) * 1024
-resource.setrlimit(resource.RLIMIT_DATA, (held + (64 << 20), -1))
+resource.setrlimit(resource.RLIMIT_DATA, (held + (8 << 20), -1))
 try:
     render("SCENES/gprims.usda", size=(2000, 2000))
 except GpuMemoryError as error:
