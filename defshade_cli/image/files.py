@@ -4,21 +4,20 @@
     others   a picture to look at (image.colour.picture), one file a layer: the beauty has the path itself,
              another layer puts its name before the suffix; as a sheet all are tiles of one
 
-A file appears whole or not at all: it is written beside its target under a hidden name, then renamed.
+A file appears whole or not at all: image/appearing.py.
 """
 
 from __future__ import annotations
 
 import os
 import re
-import socket
 import tempfile
-import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 from defshade_cli.errors import OutputError
+from defshade_cli.image.appearing import appearing_at, hidden_prefix
 from defshade_cli.image.encoders import EXR, PICTURES, encode, suffix_of
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import BEAUTY, LAYERS, in_order
@@ -84,7 +83,7 @@ def remove_abandoned(folder: Path) -> None:
 
     Raises OutputError.
     """
-    prefix = _hidden_prefix()
+    prefix = hidden_prefix()
     name = re.compile(rf"{re.escape(prefix)}(\d+)-[0-9a-f]+\.\w+")
     try:
         with os.scandir(folder) if folder.is_dir() else nullcontext(()) as entries:
@@ -94,10 +93,6 @@ def remove_abandoned(folder: Path) -> None:
                 (folder / file).unlink(missing_ok=True)
     except OSError as error:
         raise OutputError(f"{folder}: {_reason(error)}") from error
-
-
-def _hidden_prefix() -> str:
-    return f".{socket.gethostname()}-"
 
 
 def _is_alive(process: int) -> bool:
@@ -112,14 +107,9 @@ def _is_alive(process: int) -> bool:
 
 @contextmanager
 def _appearing_at(path: Path) -> Iterator[Path]:
-    hidden = path.with_name(f"{_hidden_prefix()}{os.getpid()}-{threading.get_ident():x}{path.suffix}")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        try:
+        with appearing_at(path) as hidden:
             yield hidden
-            hidden.replace(path)
-        finally:
-            hidden.unlink(missing_ok=True)
     except OSError as error:
         raise OutputError(f"{path}: {_reason(error)}") from error
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import re
 from pathlib import Path
 
 from defshade_cli.errors import OutputError
+from defshade_cli.image.appearing import appearing_at
 
 _STYLE = Path(__file__).with_name("page.css")
 
@@ -19,12 +19,8 @@ def filled(template: Path, **parts: str) -> str:
 
 def place(path: Path, text: str) -> None:
     """A text file that appears whole; folders are made. Raises OutputError."""
-    hidden = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        hidden.write_text(text, encoding="utf-8")
-        hidden.replace(path)
+        with appearing_at(path) as hidden:
+            hidden.write_text(text, encoding="utf-8")
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror}") from error
-    finally:
-        hidden.unlink(missing_ok=True)
