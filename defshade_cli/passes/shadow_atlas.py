@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from defshade_cli.gpu.records import block_source, record
 from defshade_cli.gpu.residence import SHADOW_BLOCK
-from defshade_cli.passes.shadow_cameras import CUBE_FACES
 from defshade_cli.passes.view import clip_from_camera, depth_coefficients
+from defshade_cli.plan.shadow_maps import CUBE_FACES
 from defshade_cli.scene.camera import Camera
 from defshade_cli.spaces import Matrix
 

@@ -21,7 +21,6 @@ _WIDEST_DEGREES = 60.0
 _NO_WINDOW: Window = (-1.0, 1.0, -1.0, 1.0)
 _NEAREST = 1e-4  # near plane over far plane, where nothing else bounds it
 _LEAST = 1e-20  # where what is lit lies at the light itself, to float64's digits
-CUBE_FACES = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)

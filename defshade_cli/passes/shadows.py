@@ -28,7 +28,7 @@ from defshade_cli.passes.shadow_atlas import (
     placed,
     viewport,
 )
-from defshade_cli.passes.shadow_cameras import CUBE_FACES
+from defshade_cli.plan.shadow_maps import CUBE_FACES
 from defshade_cli.scene.camera import Camera
 
 _DEPTH_OFFSET = (0.0, -1.0)
@@ -56,7 +56,7 @@ class ShadowVariant:
 
 
 class ShadowPass:
-    """Draws shadow maps into an atlas of what fits ATLAS; what one call draws the next overwrites."""
+    """Draws shadow maps into an atlas; what one call draws the next overwrites."""
 
     def __init__(self, gpu: Gpu, variant: ShadowVariant) -> None:
         generated = {"generated/textures.glsl": textures_source(variant.texture_groups)}

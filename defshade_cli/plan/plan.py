@@ -198,7 +198,7 @@ class Plan:
     @property
     def shadow_resolution(self) -> int:
         """Texels along the side of each shadow map."""
-        return shadow_resolution(self.maps_a_sample)
+        return shadow_resolution(self.lights)
 
     @property
     def maps_a_sample(self) -> int:
@@ -293,10 +293,7 @@ def plan_moments(plan: Plan, seen: Iterator[Scene], settings: RenderSettings) ->
     """What the samples see in turn: `seen` with plans that fill the same planes, of the same texels."""
     for moment in seen:
         planned = make_plan(moment, settings)
-        yield (
-            moment,
-            replace(planned, planes=plan.planes, transparent=plan.transparent, texels=plan.texels),
-        )
+        yield moment, replace(planned, planes=plan.planes, transparent=plan.transparent, texels=plan.texels)
 
 
 def _seen_lights(lights: tuple[PlannedLight, ...], layers: tuple[str, ...]) -> tuple[PlannedLight, ...]:

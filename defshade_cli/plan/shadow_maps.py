@@ -7,6 +7,7 @@ less. So a sample draws about as many texels whatever the lights, until maps are
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from defshade_cli.plan.lights import PlannedLight
 from defshade_cli.scene.light import DomeLight
@@ -17,15 +18,17 @@ FINEST, COARSEST = 1024, 128
 _TEXELS = 64 * FINEST**2
 """Of all maps of a sample."""
 
-_CUBE_FACES = 6
+CUBE_FACES = 6
+"""Maps of a point that has geometry all around."""
 
 _SKY_MAPS = 4
-"""Of a dome, that count: more of them are drawn in turn, and are as fine."""
+"""Of a dome, that make maps coarser: it may draw more of them, as fine."""
 
 
-def shadow_resolution(maps: float) -> int:
-    """Texels along the side of each of some maps that a sample draws, a power of two."""
-    side = math.sqrt(_TEXELS / max(maps, 1.0))
+def shadow_resolution(lights: Sequence[PlannedLight]) -> int:
+    """Texels along the side of each map, a power of two."""
+    counted = sum(min(count_maps(p), _SKY_MAPS if isinstance(p.light, DomeLight) else math.inf) for p in lights)
+    side = math.sqrt(_TEXELS / max(counted, 1))
     return min(max(2 ** round(math.log2(side)), COARSEST), FINEST)
 
 
@@ -33,6 +36,4 @@ def count_maps(planned: PlannedLight) -> int:
     """Shadow maps that a light may need in a sample."""
     if not planned.light.casts_shadow:
         return 0
-    if isinstance(planned.light, DomeLight):
-        return min(planned.points, _SKY_MAPS)
-    return planned.points * (1 if planned.light.is_infinite else _CUBE_FACES)
+    return planned.points * (1 if planned.light.is_infinite else CUBE_FACES)
