@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -41,6 +42,16 @@ from defshade_cli.scene.emission import far_field
 from defshade_cli.scene.scene import Scene
 
 Layers = dict[str, NDArray[np.float32]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Canvas:
+    """What the samples of a frame are lit on, and what is known of its domes' skies."""
+
+    gbuffer: GBuffer
+    targets: LightTargets
+    visibility: SkyVisibility | None
+    guides: SkyGuides
 
 
 class Pipeline:
@@ -146,6 +157,7 @@ class Pipeline:
         targets.clear()
         hidden = any(plan.hides_sky(dome) for dome in plan.domes)
         visibility = SkyVisibility.of(self._frame, plan.size) if hidden else None
+        canvas = _Canvas(gbuffer, targets, visibility, guides)
         tables = self._tables.update(plan)
         self._accumulation.begin(plan.size, plan.samples)
         self._stopping.begin(plan)
@@ -158,7 +170,7 @@ class Pipeline:
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             if plan.mattes:
                 mattes.add(gbuffer.target.read("visible"))
-            self._light(draws, scene, plan, sample, tables, gbuffer, targets, visibility, guides)
+            self._light(draws, scene, plan, sample, tables, canvas)
             self._accumulation.add(radiance)
             if self._stopping.is_over(self._accumulation):
                 break
@@ -178,12 +190,10 @@ class Pipeline:
         plan: Plan,
         sample: Sample,
         tables: LightTables,
-        gbuffer: GBuffer,
-        targets: LightTargets,
-        visibility: SkyVisibility | None,
-        guides: SkyGuides,
+        canvas: _Canvas,
     ) -> None:
         """One sample of every light: as many at a time as the shadow atlas holds; then the skies, seen as they let."""
+        gbuffer, targets, visibility = canvas.gbuffer, canvas.targets, canvas.visibility
         variant = LightingVariant.of(plan)
         self._emission_pass(variant).draw(gbuffer, targets)
         if plan.tiled:
@@ -191,7 +201,7 @@ class Pipeline:
         openness = self._sky_visibility_pass(variant) if visibility else None
         if openness and visibility:
             openness.begin_sample(visibility)
-        for batch in light_batches(scene, plan, sample, guides) if plan.lit else ():
+        for batch in light_batches(scene, plan, sample, canvas.guides) if plan.lit else ():
             shadows = self._shadow_maps(draws, batch, plan, sample, tables) if plan.shadows else None
             lights, emitters = [lit.planned for lit in batch], [lit.emitter for lit in batch]
             records = light_records(lights, emitters, plan.camera.position, shadows, tables)
