@@ -17,7 +17,9 @@ from defshade_cli.measure.reference import surface_from_planes
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.plan.points import share_points
-from defshade_cli.scene.light import CylinderLight, DiskLight, Light, RectLight, SphereLight
+from defshade_cli.scene.emission import emitter_at
+from defshade_cli.scene.light import CylinderLight, DiskLight, DomeLight, Light, RectLight, SphereLight
+from defshade_cli.scene.mesh_light import MeshLight
 from defshade_cli.settings import RenderSettings
 
 STAGES = Path(__file__).resolve().parent.parent / "accuracy"
@@ -64,6 +66,17 @@ def test_a_single_sample_is_near_the_integral(pipeline: Pipeline, stage: str) ->
 )
 def test_spread_holds_every_point_of_a_light(light: Light) -> None:
     assert light.spread == pytest.approx(0.5)
+
+
+def _without_arguments(kind: type[Light]) -> Light:
+    return kind(path="/l", world_from_light=at(0, 0, 0), color=(1, 1, 1))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("kind", [kind for kind in Light.__subclasses__() if kind not in (DomeLight, MeshLight)])
+def test_samples_see_points_all_over_a_light(kind: type[Light]) -> None:
+    """A kind without a case in scene/emission.py would be a point, its shadows sharp."""
+    points = [emitter_at(_without_arguments(kind), (u, u, u), np.array([0.0, 0.0, -5.0])) for u in (0.1, 0.6)]
+    assert (points[0].position != points[1].position).any() or (points[0].axis != points[1].axis).any()
 
 
 def test_large_lights_share_the_points_that_few_samples_lack() -> None:

@@ -17,7 +17,7 @@ from defshade_cli.image.render_space import RenderSpace
 from defshade_cli.plan.cost import choose_lighting
 from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.groups import light_groups, light_outputs
-from defshade_cli.plan.lights import PlannedLight, Volume, plan_lights
+from defshade_cli.plan.lights import PlannedLight, plan_lights
 from defshade_cli.plan.moments import count_moments, share_moments
 from defshade_cli.plan.opacity import is_transparent, thin_materials, thin_numbers
 from defshade_cli.plan.shadow_maps import count_maps, shadow_resolution
@@ -215,21 +215,6 @@ class Plan:
         """The IES profiles of the lights, each once."""
         shapings = [planned.light.shaping for planned in self.lights]
         return tuple(dict.fromkeys(shaping.ies for shaping in shapings if shaping and shaping.ies))
-
-    @property
-    def volumes(self) -> tuple[Volume, ...]:
-        """The kinds of volume that some light has, in the order of the lights."""
-        return tuple(dict.fromkeys(planned.volume for planned in self.lights))
-
-    @property
-    def passes(self) -> tuple[str, ...]:
-        """Names of the passes in the order of the pipeline."""
-        before = ("gbuffer", "emission", *("environment",) * bool(self.domes), *("shadow maps",) * self.shadows)
-        light = ("light tiles",) * bool(self.lights) if self.tiled else tuple(f"light {kind}" for kind in self.volumes)
-        lighting = before + light
-        accumulation = ("accumulation",) * (self.samples > 1) + ("batch means",) * self.tracks_error
-        accumulation += (f"debug {self.debug}",) * (self.debug is not None)
-        return (lighting + accumulation if self.sampled else ()) + ("data gbuffer",) * self.data_pass
 
     @property
     def decisions(self) -> tuple[Decision, ...]:
