@@ -1,10 +1,12 @@
 """GLSL sources: includes, line origins, records."""
 
+import ctypes
+
 import numpy as np
 import pytest
 
 from defshade_cli.errors import ShaderError
-from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.context import LIBEGL, Gpu
 from defshade_cli.gpu.records import record, record_of
 from defshade_cli.gpu.shaders import assemble
 from defshade_cli.resources import SHADERS
@@ -88,6 +90,17 @@ def test_contexts_keep_to_themselves(gpu: Gpu) -> None:
     third.close()
     gpu.make_current()
     assert mine.read() == b"mine"
+
+
+def test_a_closed_context_is_gone(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """EGL only marks one that is current; it would live on, with what it drew last, until the process ends."""
+    with monkeypatch.context() as patch:
+        patch.setattr(Gpu, "_open", [])
+        Gpu().close()
+        current = ctypes.CDLL(LIBEGL).eglGetCurrentContext
+        current.restype = ctypes.c_void_p
+        assert current() is None
+    gpu.make_current()
 
 
 def test_libraries_hold_no_main_and_entry_points_do() -> None:

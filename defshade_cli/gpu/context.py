@@ -67,9 +67,15 @@ class Gpu:
         self.context.__enter__()
 
     def close(self) -> None:
-        """Release all that was kept, in this context whichever is current, and hand on to the newest one open."""
+        """Release all that was kept, in this context whichever is current, and hand on to the newest one open.
+
+        Draws end before what they read is gone, and the context is let go of first: EGL would keep one that is current,
+        with its threads, until the process ends.
+        """
         self.make_current()
+        self.context.finish()
         self._stack.close()
+        self.context.__exit__(None, None, None)
         self.context.release()
         self._open.remove(self)
         if self._open:
