@@ -110,6 +110,7 @@ def test_broken_stages_are_named_and_all_others_rendered(folder: Path) -> None:
     assert sorted(done.stdout.split()) == ["out/gprims.1.exr", "out/gprims.2.exr"]
     assert "6 frames in" in done.stderr and "2 rendered, 0 skipped, 4 failed" in done.stderr
     assert "frame 1 of shots/missing.usda failed: no such file: shots/missing.usda" in done.stderr
+    assert "2 frames of shots/missing.usda failed, 1 to 2: no such file: shots/missing.usda" in done.stderr
     record = json.loads(Path("stats.json").read_text())
     assert sorted((f["stage"], f["attempts"]) for f in record["frames"] if f["outcome"] == "failed") == [
         ("shots/empty.usda", 2),
@@ -249,7 +250,7 @@ def test_dry_run_prints_tasks_and_given_options_count() -> None:
         ("frames: 1\n", "job.yaml: a job file names its stages"),
         ("- a.usda\n", "job.yaml:1: expected keys of stages"),
         ("stages: a.usda\nframe: 1\n", "job.yaml:2: unknown key 'frame'; did you mean 'frames'?"),
-        ("stages: a.usda\nframes: 1-10\n", "job.yaml:2: frames '1-10'"),
+        ("stages: a.usda\nframes: 1-10:2\n", "job.yaml:2: frames '1-10:2'"),
         ("stages: a.usda\nsettings:\n  sample: 4\n", "job.yaml:3: unknown key 'sample'; did you mean 'samples'?"),
         ("stages: a.usda\nsettings:\n  samples: 0\n", "job.yaml:3: 0 is not in the range"),
         ("stages: a.usda\nsettings:\n  samples: 1\n  samples: 2\n", "job.yaml:4: 'samples' stands here a second time"),

@@ -148,6 +148,7 @@ def test_version() -> None:
     [
         pytest.param(2, "--sample", ["render", "s.usda", "--sample", "4"], id="unknown option"),
         pytest.param(2, "paint", ["paint", "s.usda"], id="unknown command"),
+        pytest.param(2, "'render'", ["rneder", "s.usda"], id="command suggested"),
         pytest.param(2, "SCENE", ["render"], id="no scene"),
         pytest.param(2, "depht", ["render", "s.usda", "--layers", "beauty,depht"], id="unknown layer"),
         pytest.param(2, "'depth'", ["render", "s.usda", "--layers", "beauty,depht"], id="layer suggested"),
@@ -159,6 +160,7 @@ def test_version() -> None:
         pytest.param(2, "0x8", ["render", "s.usda", "--size", "0x8"], id="size of nothing"),
         pytest.param(2, "nan", ["render", "s.usda", "--exposure", "nan"], id="exposure that is not a number"),
         pytest.param(2, "0", ["render", "s.usda", "--samples", "0"], id="no samples"),
+        pytest.param(2, "whole number", ["render", "s.usda", "--samples", "four"], id="samples in words"),
         pytest.param(2, "proxies", ["render", "s.usda", "--purposes", "proxies"], id="unknown purpose"),
         pytest.param(3, "missing.usda", ["render", "missing.usda"], id="no such stage"),
         pytest.param(3, "missing.usda", ["inspect", "missing.usda"], id="no such stage to inspect"),
@@ -170,6 +172,8 @@ def test_version() -> None:
             2, "out.exr", ["render", "stages/triangle.usda", "--frames", "1:3", "-o", "out.exr"], id="no token"
         ),
         pytest.param(2, ".xyz", ["render", "stages/triangle.usda", "-o", "out.xyz"], id="unknown format"),
+        pytest.param(2, "ends with its format", ["render", "stages/triangle.usda", "-o", "out"], id="no format"),
+        pytest.param(2, "Radio", ["render", "stages/triangle.usda", "--display", "Radio"], id="display for no picture"),
         pytest.param(5, "stats.json", ["render", "stages/triangle.usda", "--stats", "no/stats.json"], id="stats"),
         pytest.param(2, "rsme", ["compare", "a.exr", "b.exr", "--threshold", "rsme=1"], id="unknown metric"),
         pytest.param(5, "missing.exr", ["compare", "missing.exr", "missing.exr"], id="nothing to compare"),
@@ -311,7 +315,7 @@ def test_inspect_shows_what_is_there() -> None:
     assert "/Eye  ← selected" in shown
     assert "/Sun  distant → quad" in shown
     assert "/Dark  sphere, gives no light" in shown
-    assert "1 triangles" in shown
+    assert "triangles: 1" in shown
 
 
 def test_inspect_times_the_steps_of_a_frame() -> None:

@@ -12,6 +12,7 @@ A command is imported when it is called for, and a driver or a foreign library b
 
 from __future__ import annotations
 
+import difflib
 import sys
 from importlib import import_module
 
@@ -43,7 +44,11 @@ class _Group(click.Group):
         return list(COMMANDS)
 
     def get_command(self, context: click.Context, name: str) -> click.Command | None:
-        return command_of(name) if name in COMMANDS else None
+        if name in COMMANDS:
+            return command_of(name)
+        if close := difflib.get_close_matches(name, COMMANDS, 1):
+            context.fail(f"no command named '{name}'; did you mean '{close[0]}'?")
+        return None
 
 
 @click.group(cls=_Group, context_settings=_HELP, epilog=_CODES, invoke_without_command=True)

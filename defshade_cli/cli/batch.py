@@ -29,7 +29,7 @@ from defshade_cli.cli.options import (
 from defshade_cli.cli.progress import frame_name, make_progress, start_logging
 from defshade_cli.cli.table import BatchTable
 from defshade_cli.cli.tally import Tally
-from defshade_cli.cli.types import Amount
+from defshade_cli.cli.types import Amount, Whole
 from defshade_cli.errors import BatchError, UsageError
 from defshade_cli.settings import RenderJob
 
@@ -92,21 +92,21 @@ def _batch_options() -> list[Function]:
     return [
         option(
             "--workers",
-            type=click.IntRange(min=1),
+            type=Whole(min=1),
             metavar="N",
             default_text="one a core, as memory allows",
             help="Worker processes.",
         ),
         option(
             "--chunk",
-            type=click.IntRange(min=1),
+            type=Whole(min=1),
             metavar="N",
             default_text="a quarter of a worker's share, at most 16",
             help="Frames of a stage that a worker takes at a time.",
         ),
         option(
             "--retries",
-            type=click.IntRange(min=0),
+            type=Whole(min=0),
             metavar="N",
             default=1,
             default_text="1",

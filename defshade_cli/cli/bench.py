@@ -13,8 +13,9 @@ import click
 from defshade_cli import __version__, settings
 from defshade_cli.cli.options import Function, HeadedCommand, Option, epilog, make_job, take
 from defshade_cli.cli.options.stage import stage_options
+from defshade_cli.cli.progress import show_log
 from defshade_cli.cli.stats import plain
-from defshade_cli.cli.types import Counts, Names, Positive, Size
+from defshade_cli.cli.types import Counts, Names, Positive, Size, Whole
 from defshade_cli.errors import OutputError, UsageError
 from defshade_cli.settings import RenderJob
 
@@ -40,7 +41,7 @@ def _bench_options() -> list[Function]:
         image("--size", type=Size(), metavar="WxH", help="Size in pixels. The default is the stage's, then 1920x1080."),
         image(
             "--width",
-            type=click.IntRange(min=1),
+            type=Whole(min=1),
             metavar="PIXELS",
             help="Width in pixels; the height follows the camera's aspect.",
         ),
@@ -77,7 +78,7 @@ def _bench_options() -> list[Function]:
         ),
         option(
             "--rounds",
-            type=click.IntRange(min=1),
+            type=Whole(min=1),
             metavar="N",
             default=3,
             default_text="3",
@@ -92,7 +93,7 @@ def _bench_options() -> list[Function]:
         ),
         option(
             "--reference-samples",
-            type=click.IntRange(min=1),
+            type=Whole(min=1),
             metavar="N",
             default=1024,
             default_text="1024",
@@ -123,7 +124,7 @@ def _bench_options() -> list[Function]:
         ),
         option(
             "--device",
-            type=click.IntRange(min=0),
+            type=Whole(min=0),
             metavar="N",
             help="Graphics device, by its index in 'defshade doctor'.",
         ),
@@ -173,6 +174,7 @@ def bench(
 
     if plot_file is not None and plot_file.suffix.lower() != ".svg":
         raise UsageError(f"{plot_file}: plots are drawn as .svg")
+    show_log()
     benches = []
     with Gpu(jobs[0].device) as gpu:
         pipeline = Pipeline(gpu)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from defshade_cli.cli.options import HeadedCommand, epilog, takes_stage
-from defshade_cli.cli.progress import frame_name
+from defshade_cli.cli.progress import frame_name, show_log
 from defshade_cli.cli.stats import plain
 from defshade_cli.settings import RenderJob
 
@@ -53,6 +53,7 @@ def inspect(job: RenderJob, as_json: bool, with_plan: bool, timing: bool, saved:
     """
     from defshade_cli.rendering import examine, save_settings, time_steps
 
+    show_log()
     scene, plan = examine(job)
     if saved is not None:
         save_settings(job, scene, plan, saved)
@@ -108,7 +109,7 @@ def _tree(job: RenderJob, scene: Scene, plan: Plan, with_plan: bool) -> Tree:
     _branch(tree, "cameras", _camera_lines(scene))
     _branch(tree, "lights", [_light_line(*light) for light in _lights(scene, plan)])
     _branch(tree, "materials", [material.path for material in scene.materials])
-    _branch(tree, "geometry", [f"{count:,} {noun}" for noun, count in _geometry(scene).items()], counted=False)
+    _branch(tree, "geometry", [f"{noun}: {count:,}" for noun, count in _geometry(scene).items()], counted=False)
     _add_unsupported(tree, scene)
     if with_plan:
         _branch(tree, "plan", [f"{d.subject}: {d.choice} ({d.reason})" for d in plan.decisions], counted=False)
@@ -138,7 +139,7 @@ def _add_unsupported(tree: Tree, scene: Scene) -> None:
     paths = defaultdict(list)
     for prim in scene.unsupported:
         paths[prim.reason].append(prim.path)
-    branch = _branch(tree, "unsupported", [])
+    branch = _branch(tree, "unsupported", []) if not paths else tree.add("unsupported")
     for reason in sorted(paths):
         _branch(branch, reason, paths[reason])
 

@@ -183,7 +183,11 @@ def make_progress(reporting: Reporting, total: int, bar: type[Progress] = Bar) -
 
 def start_logging(reporting: Reporting) -> None:
     """Show the package's log from warnings up; from errors up when quiet, everything when verbose."""
-    level = logging.ERROR if reporting.quiet else logging.DEBUG if reporting.verbose else logging.WARNING
+    show_log(logging.ERROR if reporting.quiet else logging.DEBUG if reporting.verbose else logging.WARNING)
+
+
+def show_log(level: int = logging.WARNING) -> None:
+    """Show the package's log on stderr, from a level of `logging` up."""
     logger = logging.getLogger("defshade")
     logger.setLevel(level)
     logger.handlers = [_Echo()]

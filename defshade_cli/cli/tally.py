@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -47,7 +48,7 @@ class Tally:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if not self._reporting.quiet:
+        if not self._reporting.quiet and (error is None or any(self._counts.values())):
             click.echo(self.summary, err=True)
         self._record["seconds"] = time.perf_counter() - self._start
         self._write()
@@ -71,12 +72,13 @@ class Tally:
 
     @property
     def summary(self) -> str:
-        """Counts, time and rate, then a line for each failure."""
+        """Counts, time and rate, then a line for what failed alike."""
         seconds = time.perf_counter() - self._start
         done = sum(self._counts.values())
         counts = ", ".join(f"{count} {what}" for what, count in self._counts.items())
-        head = f"{done} frames in {seconds:.1f} s ({done / seconds:.1f} a second): {counts}"
-        return "\n".join([head, *(f"  {failure(outcome)}" for outcome in self.failures)])
+        noun = "frame" if done == 1 else "frames"
+        head = f"{done} {noun} in {seconds:.1f} s ({done / seconds:.1f} a second): {counts}"
+        return "\n".join([head, *(f"  {line}" for line in _failures(self.failures))])
 
     @property
     def verdict(self) -> str:
@@ -99,6 +101,17 @@ class Tally:
             path.write_text(json.dumps(plain(self._record), indent=2, allow_nan=False) + "\n", encoding="utf-8")
         except OSError as error:
             raise OutputError(f"cannot write {path}: {error.strerror}") from error
+
+
+def _failures(outcomes: Iterable[Outcome]) -> Iterator[str]:
+    """A line each, or one for the frames of a stage that failed for the same reason."""
+    alike = defaultdict(list)
+    for outcome in outcomes:
+        alike[outcome.stage, outcome.error].append(outcome)
+    for (stage, error), those in alike.items():
+        first, last = (frame_name(outcome.frame) for outcome in (those[0], those[-1]))
+        several = f"{len(those)} frames of {stage} failed, {first} to {last}: {error}"
+        yield failure(those[0]) if len(those) == 1 else several
 
 
 def _figures(outcome: Outcome, what: str) -> dict[str, Any]:

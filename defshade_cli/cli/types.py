@@ -113,6 +113,12 @@ class Frames(click.ParamType):
             self.fail(str(error), param, ctx)
 
 
+class Whole(click.IntRange):
+    """A whole number, of a range where one is given."""
+
+    name = "whole number"
+
+
 class OneOf(click.ParamType):
     """One of some whole numbers."""
 
@@ -198,7 +204,7 @@ class PrimPaths(click.ParamType):
         return tuple(dict.fromkeys(paths))
 
 
-class Ranks(click.IntRange):
+class Ranks(Whole):
     """Ranks of a Cryptomatte, which stand two by two in its channels."""
 
     def __init__(self) -> None:

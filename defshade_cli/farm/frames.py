@@ -5,7 +5,8 @@
     101:102x0.25   fractional frames        1:10x2,15   both, in this order
 
 `openjd:1-10:2,15` is what Open Job Description's tasks name a chunk of frames, with its own meaning: 1 3 5 7 9 15.
-`1-10x2` is read as `1:10x2`. `1-10` and `1-10:2` are refused, because what the colon steps over differs between tools.
+`1-10` and `1-10x2` are read as `1:10` and `1:10x2`. `1-10:2` is refused, because what the colon steps over differs
+between tools.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ OPENJD = "openjd:"
 MOST_FRAMES = 1_000_000
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
-_SPEC = re.compile(rf"({_NUMBER})(?:(?::({_NUMBER})(?:x({_NUMBER}))?)|(?:-({_NUMBER})x({_NUMBER})))?")
+_SPEC = re.compile(rf"({_NUMBER})(?:(?::({_NUMBER})(?:x({_NUMBER}))?)|(?:-({_NUMBER})(?:x({_NUMBER}))?))?")
 _OPENJD_RANGE = re.compile(r"(-?\d+)(?:-(-?\d+)(?::(-?\d+))?)?")
-_DASHED = re.compile(rf"({_NUMBER})-({_NUMBER})(?::({_NUMBER}))?")
+_DASHED = re.compile(rf"({_NUMBER})-({_NUMBER}):({_NUMBER})")
 
 
 def parse_frames(text: str) -> tuple[float, ...]:
@@ -70,8 +71,7 @@ def _refusal(spec: str) -> str:
     if dashed is None:
         return f"frames '{spec}': write a frame (12), a range (1:10), a stride (1:10x2), or several between commas"
     first, last, step = dashed.groups()
-    meant = f"{first}:{last}x{step}" if step else f"{first}:{last}"
     return (
         f"frames '{spec}': '{first}-{last}:n' means other frames in other tools (OpenJD steps by n, "
-        f"fileseq staggers); write {meant}"
+        f"fileseq staggers); write {first}:{last}x{step}"
     )

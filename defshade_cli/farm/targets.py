@@ -57,9 +57,9 @@ def _check_formats(files: Sequence[Path], job: RenderJob) -> None:
     """files: one of each suffix."""
     for file in files:
         check_format(file, job.output)
-    if any(suffix_of(file) != EXR for file in files):
-        space = RenderSpace(config=job.settings.ocio)
-        display_transform(job.output.display, job.output.view, job.output.look, space)
+    chosen = (job.output.display, job.output.view, job.output.look)
+    if any(chosen) or any(suffix_of(file) != EXR for file in files):
+        display_transform(*chosen, RenderSpace(config=job.settings.ocio))
 
 
 def remove_leftovers(shots: Sequence[Shot]) -> None:

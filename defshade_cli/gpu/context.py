@@ -211,6 +211,8 @@ def _create_context(device: int | None) -> moderngl.Context:
         return moderngl.create_context(standalone=True, **options)
     except Exception as error:  # glcontext raises bare Exception, ValueError or ImportError by case
         reason = str(error).rstrip(".")
+        if "device index" in reason and "found 0" not in reason:
+            raise GpuError(f"no device {device} ({reason}); `defshade doctor` lists those there are") from error
         raise GpuError(f"no OpenGL context through EGL ({reason}); on Debian or Ubuntu: {INSTALL_HINT}") from error
 
 

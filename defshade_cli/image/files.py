@@ -75,7 +75,7 @@ def check_writable(path: Path) -> None:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise OutputError(f"{path}: {_reason(error)}") from error
+        raise OutputError(f"cannot write {path}: {_reason(error)}") from error
 
 
 def remove_abandoned(folder: Path) -> None:
@@ -111,7 +111,7 @@ def _appearing_at(path: Path) -> Iterator[Path]:
         with appearing_at(path) as hidden:
             yield hidden
     except OSError as error:
-        raise OutputError(f"{path}: {_reason(error)}") from error
+        raise OutputError(f"cannot write {path}: {_reason(error)}") from error
 
 
 def _reason(error: OSError) -> str:

@@ -7,7 +7,7 @@ import functools
 import click
 
 from defshade_cli.cli.options.option import Function, Option
-from defshade_cli.cli.types import Direction
+from defshade_cli.cli.types import Direction, Whole
 
 
 def framing_options() -> list[Function]:
@@ -21,7 +21,7 @@ def framing_options() -> list[Function]:
         ),
         option(
             "--turntable",
-            type=click.IntRange(min=1),
+            type=Whole(min=1),
             metavar="N",
             help="Go around all of the stage once in N frames, which are 1 to N. --frames picks some of them.",
         ),

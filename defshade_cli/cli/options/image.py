@@ -10,7 +10,7 @@ import click
 from defshade_cli import settings
 from defshade_cli.cli.options.option import Function, Option
 from defshade_cli.cli.options.sampling import sampling_options
-from defshade_cli.cli.types import Crop, Finite, Layers, Positive, Ranks, Size
+from defshade_cli.cli.types import Crop, Finite, Layers, Positive, Ranks, Size, Whole
 from defshade_cli.settings import RenderSettings
 
 _RENDER = RenderSettings()
@@ -28,7 +28,7 @@ def image_options(layers: Sequence[str] = ()) -> list[Function]:
         ),
         option(
             "--width",
-            type=click.IntRange(min=1),
+            type=Whole(min=1),
             metavar="PIXELS",
             help="Width in pixels; the height follows the camera's aspect.",
         ),

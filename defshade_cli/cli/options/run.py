@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from defshade_cli.cli.options.option import Function, Option
+from defshade_cli.cli.types import Whole
 
 PROGRESS = ("auto", "bar", "alf", "openjd", "json", "none")
 
@@ -41,7 +42,7 @@ def run_options() -> list[Function]:
     return [
         option(
             "--device",
-            type=click.IntRange(min=0),
+            type=Whole(min=0),
             metavar="N",
             help="Graphics device, by its index in 'defshade doctor'.",
         ),
@@ -66,7 +67,7 @@ def run_options() -> list[Function]:
         ),
         option(
             "--memory-limit",
-            type=click.IntRange(min=1),
+            type=Whole(min=1),
             metavar="MIB",
             help="Give a frame up whose process holds more memory than this; implies --isolate.",
         ),

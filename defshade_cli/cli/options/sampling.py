@@ -8,7 +8,7 @@ import click
 
 from defshade_cli import settings
 from defshade_cli.cli.options.option import Function, Option
-from defshade_cli.cli.types import Positive
+from defshade_cli.cli.types import Positive, Whole
 from defshade_cli.settings import RenderSettings
 
 _RENDER = RenderSettings()
@@ -21,7 +21,7 @@ def sampling_options() -> list[Function]:
     return [
         option(
             "--samples",
-            type=click.IntRange(min=1),
+            type=Whole(min=1),
             default_text=f"1, and {settings.MOST_SAMPLES} with --max-error or --time-limit",
             metavar="N",
             help="Samples a pixel of the beauty: places in the pixel, on the lens and on every light. "
@@ -29,7 +29,7 @@ def sampling_options() -> list[Function]:
         ),
         option(
             "--light-points",
-            type=click.IntRange(min=1),
+            type=Whole(min=1),
             default=_RENDER.light_points,
             default_text=str(_RENDER.light_points),
             metavar="N",

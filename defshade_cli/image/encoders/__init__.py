@@ -20,7 +20,8 @@ def suffix_of(path: Path) -> str:
     """The suffix in lower case. Raises UsageError for one that no encoder has."""
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise UsageError(f"'{path}': no format for the suffix '{path.suffix}'; write {', '.join(SUFFIXES)}")
+        lacking = f"no format has the suffix '{suffix}'" if suffix else "a file's name ends with its format"
+        raise UsageError(f"'{path}': {lacking}; write {', '.join(SUFFIXES)}")
     return suffix
 
 
