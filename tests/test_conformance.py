@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis.extra.numpy import arrays
 
+from browser import needs_browser, told_by
 from defshade_cli.errors import UsageError
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.measure.conformance import batch
@@ -159,6 +160,44 @@ def test_the_page_holds_everything_itself(tmp_path: Path) -> None:
     assert page.count("data:image/webp;base64,cGljdHVyZQ==") == 3
     assert "&lt;y&gt;.usda" in page and "/v: volumes are not drawn" in page and "its worker ended with -11" in page
     assert not re.search(r'(?:src|href)="(?!data:)', page) and "{{" not in page
+
+
+DRIVE = """
+  const shown = () => [...document.querySelectorAll("article h2")].map(h => h.textContent);
+  const choose = (id, value) => {
+    const field = document.getElementById(id);
+    field.value = value;
+    field.dispatchEvent(new Event("input", {bubbles: true}));
+    return [shown(), document.getElementById("count").textContent];
+  };
+  const told = {all: choose("search", "")};
+  told.worst = choose("order", "iou")[0];
+  told.fails = choose("verdict", "fails");
+  told.found = choose("search", "z.usda STORM")[0].concat(choose("search", "z.usda none")[0]);
+  choose("search", ""), choose("verdict", "");
+  document.querySelector("article summary").click();
+  told.notes = document.querySelector("article li").checkVisibility();
+  document.querySelector("article img").click();
+  told.close = document.getElementById("close-up").open;
+  document.getElementById("close-up").click();
+  told.closed = document.getElementById("close-up").open;
+  tell(told);
+"""
+
+
+@needs_browser
+def test_the_page_in_a_browser(tmp_path: Path) -> None:
+    """Sort, choose, search, open what is reported, and look at a picture."""
+    (tmp_path / "index.html").write_text(page_of(results(tmp_path), tmp_path))
+    assert told_by(tmp_path / "index.html", DRIVE) == {
+        "all": [["x.usda", "<y>.usda", "p.usda", "z.usda"], "4 of 4"],
+        "worst": ["<y>.usda", "p.usda", "x.usda", "z.usda"],
+        "fails": [["<y>.usda", "z.usda"], "2 of 4"],
+        "found": ["z.usda"],
+        "notes": True,
+        "close": True,
+        "closed": False,
+    }
 
 
 def test_the_report_says_what_fails(tmp_path: Path) -> None:
