@@ -33,6 +33,7 @@ SHELL := /bin/bash
 PYTHON ?= python3
 PEERS_PYTHON ?= .venv/bin/python
 BIN := .venv/bin
+PYTEST = $(BIN)/pytest -q --numprocesses logical --maxprocesses 8 --dist worksteal
 LIBRARIES := libEGL.so.1 libGL.so.1
 LIBRARY_PACKAGES := libegl1 libgl1 libgl1-mesa-dri
 
@@ -54,13 +55,13 @@ demo: .venv/.ready
 	echo "defshade: the demo is out/showcase.png, and scene-linear in out/showcase.exr"
 
 test: .venv/.ready-dev
-	$(BIN)/pytest -q
+	$(PYTEST)
 
 check: lint
-	$(BIN)/pytest -q -m "not slow and not renders"
+	$(PYTEST) -m "not slow and not renders"
 
 coverage: .venv/.ready-dev
-	$(BIN)/pytest -q --cov --cov-report=term:skip-covered --cov-report=html:build/coverage
+	$(PYTEST) --cov --cov-report=term:skip-covered --cov-report=html:build/coverage
 
 lint: .venv/.ready-dev
 	$(BIN)/ruff check .

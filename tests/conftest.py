@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 settings.register_profile("steady", deadline=None)  # a busy machine is no fault of an example's
 settings.load_profile("steady")
 
+if "PYTEST_XDIST_WORKER" in os.environ:  # each core has tests of its own to draw for
+    os.environ.setdefault("LP_NUM_THREADS", "1")
+
 ROOT = Path(__file__).resolve().parent.parent
 
 RENDERERS = {"CliRunner", "Renderer", "render", "run", "subprocess"}

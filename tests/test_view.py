@@ -214,7 +214,7 @@ DRIVE = """
   const box = canvas.getBoundingClientRect();
   const told = {layers: all("#layers button").map(button => button.textContent), size: [canvas.width, canvas.height]};
   told.beauty = pixels(0, 0, 37, 21);
-  const place = {clientX: box.left + 5.5 / 37 * box.width, clientY: box.top + 20.5 / 21 * box.height};
+  const place = {clientX: Math.ceil(box.left - 0.5) + 5, clientY: Math.ceil(box.top - 0.5) + 20};
   canvas.dispatchEvent(new PointerEvent("click", {bubbles: true, ...place}));
   await until(() => all("#probe tr").length);
   told.where = document.getElementById("where").textContent;
