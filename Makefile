@@ -71,7 +71,7 @@ lint: .venv/.ready-dev
 docs: .venv/.ready-docs
 	$(BIN)/python -m defshade_cli.cli.reference > docs/commands.md
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict
-	echo "defshade: the documents are build/site/index.html"
+	echo "defshade: the documents are build/site/index.html; with a search at python3 -m http.server --directory build/site"
 
 bench-reading: .venv/.ready
 	$(BIN)/python benchmarks/reading.py
