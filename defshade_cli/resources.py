@@ -1,7 +1,8 @@
-"""Where the package's own data lies: beside the package in a checkout, inside it in a wheel."""
+"""Where the package's own data lies, beside the package in a checkout, inside it in a wheel; and what it runs on."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent
@@ -14,3 +15,8 @@ def _folder(name: str) -> Path:
 
 SHADERS = _folder("shaders")
 SCENES = _folder("scenes")
+
+
+def core_count() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0))

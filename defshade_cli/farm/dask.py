@@ -19,8 +19,9 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from defshade_cli.errors import UsageError
-from defshade_cli.farm.local import LocalEngine, core_count
+from defshade_cli.farm.local import LocalEngine
 from defshade_cli.farm.tasks import Chunk, Outcome, failed
+from defshade_cli.resources import core_count
 
 if TYPE_CHECKING:
     from distributed import Client, Future

@@ -24,6 +24,7 @@ from typing import Self
 
 from defshade_cli.farm.limits import INTERVAL, Limits
 from defshade_cli.farm.tasks import Chunk, Outcome, failed, joined
+from defshade_cli.resources import core_count
 
 BYTES_PER_WORKER = 3 << 29
 """1.5 GiB: a process with its libraries takes 330 MiB, a 1920x1080 frame with all layers some 500 MiB more."""
@@ -182,11 +183,6 @@ class _Worker:
 def default_workers(chunks: int) -> int:
     """One a core, as long as memory suffices and there is work for each."""
     return max(1, min(core_count(), _available_memory() // BYTES_PER_WORKER, chunks))
-
-
-def core_count() -> int:
-    """The cores that this process may use."""
-    return len(os.sched_getaffinity(0))
 
 
 def _available_memory() -> int:

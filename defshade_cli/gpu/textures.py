@@ -88,7 +88,7 @@ class TextureStore:
         dtype = "f1" if images[0].texels.dtype == np.uint8 else "f2"
         array = self._gpu.texture_array((width, height, len(images)), components, dtype, srgb=images[0].srgb)
         for layer, image in enumerate(images):
-            array.write(image.texels.tobytes(), viewport=(0, 0, layer, width, height, 1), alignment=1)
+            array.write(np.ascontiguousarray(image.texels), viewport=(0, 0, layer, width, height, 1), alignment=1)
         array.build_mipmaps()
         array.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
         array.anisotropy = self._anisotropy()

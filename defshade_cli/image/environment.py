@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.errors import OutputError
 from defshade_cli.image.projections import latlong_from
+from defshade_cli.image.transfer import linear
 from defshade_cli.scene.environment import Environment, SkyLayout, uniform_environment
 from defshade_cli.scene.light import DomeLight
 
@@ -57,14 +58,9 @@ def _read(path: str, layout: SkyLayout, _changed: int) -> Environment:
         image = oiio.ImageBufAlgo.resize(image, filtername="box", roi=oiio.ROI(0, _WIDEST, 0, height))
     pixels = _rgb(np.asarray(image.get_pixels(oiio.FLOAT)))
     pixels = np.where(np.isfinite(pixels), np.maximum(pixels, 0.0), 0.0)
-    return Environment(latlong_from(_linear_from_srgb(pixels) if is_display_referred else pixels, layout))
+    return Environment(latlong_from(linear(pixels) if is_display_referred else pixels, layout))
 
 
 def _rgb(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
     """Three channels: grey repeated, alpha dropped."""
     return np.repeat(pixels[..., :1], 3, axis=2) if pixels.shape[2] < 3 else pixels[..., :3]
-
-
-def _linear_from_srgb(c: NDArray[np.float32]) -> NDArray[np.float32]:
-    """IEC 61966-2-1."""
-    return np.where(c > 0.04045, ((c + 0.055) / 1.055) ** 2.4, c / 12.92)

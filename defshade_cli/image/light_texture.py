@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from defshade_cli.image.texture import Source, TexelImage, load_images
+from defshade_cli.image.transfer import linear
 from defshade_cli.scene.light import Light, RectLight
 from defshade_cli.scene.radiance_map import RadianceMap
 from defshade_cli.scene.texture import ImageFile
@@ -46,5 +47,5 @@ def _linear(image: TexelImage) -> np.ndarray:
     texels = image.texels.astype(np.float32) / (255.0 if image.texels.dtype == np.uint8 else 1.0)
     colors = texels[::-1, :, :3] if texels.shape[2] >= 3 else np.repeat(texels[::-1, :, :1], 3, axis=2)
     if image.srgb:
-        colors = np.where(colors > 0.04045, ((colors + 0.055) / 1.055) ** 2.4, colors / 12.92)
+        colors = linear(colors)
     return np.maximum(colors, 0.0)

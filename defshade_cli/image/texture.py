@@ -9,20 +9,25 @@ from __future__ import annotations
 
 import logging
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import PurePath
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
+from defshade_cli.image.reduction import reduced, resampled
 from defshade_cli.image.render_space import LINEAR_REC709
+from defshade_cli.image.transfer import linear
+from defshade_cli.resources import core_count
 from defshade_cli.scene.texture import STATED_SPACES, ColorSpace, ImageFile, Wrap
 from defshade_cli.spaces import Matrix
+
+_T = TypeVar("_T")
 
 log = logging.getLogger("defshade")
 
@@ -32,6 +37,8 @@ BUDGET = 1 << 30
 """Bytes that all textures of a scene may take on the device, mip levels included; past it the largest are halved."""
 
 _SMALLEST = 64
+_MOST_AT_ONCE = 4
+"""Images that are read at once, each of which takes its memory at full size for a while."""
 _MIPS = 4 / 3
 _HALF_MAX = 65504.0
 _WRAPS: dict[str, Wrap] = {"black": "black", "clamp": "clamp", "periodic": "repeat", "mirror": "mirror"}
@@ -79,30 +86,20 @@ def load_images(sources: Mapping[Source, float]) -> dict[Source, TexelImage]:
 
     What cannot be read is logged and left out.
     """
-    headers = {}
-    for source in sources:
-        try:
-            headers[source] = _read_header(source.file)
-        except OSError as error:
-            log.warning("texture %s: %s", source.file.path, error)
+    headers = dict(_each(_read_header, sources))
     worth = {source: min(LARGEST, max(side, _SMALLEST)) for source, side in sources.items()}
     side = LARGEST
     while side > _SMALLEST and sum([h.bytes_at(min(side, worth[s])) for s, h in headers.items()]) > BUDGET:
         side //= 2
-    images = {}
-    for source, header in headers.items():
-        try:
-            images[source] = _read_image(source, header, int(min(side, worth[source])))
-        except OSError as error:
-            log.warning("texture %s: %s", source.file.path, error)
-    return images
+    sides = {source: int(min(side, worth[source])) for source in headers}
+    return dict(_each(lambda source: _read_image(source, headers[source], sides[source]), headers))
 
 
 def resized(image: TexelImage, size: tuple[int, int]) -> TexelImage:
     """The image at (width, height), filtered as stored."""
     if image.texels.shape[1::-1] == size:
         return image
-    return replace(image, texels=_resampled(image.texels, *size))
+    return replace(image, texels=resampled(image.texels, *size))
 
 
 def world_to_screen(file: ImageFile) -> Matrix | None:
@@ -112,8 +109,22 @@ def world_to_screen(file: ImageFile) -> Matrix | None:
     return values.astype(np.float64).reshape(4, 4) if values.size == 16 and values.dtype.kind in "fi" else None
 
 
-def _read_header(file: ImageFile) -> _Header:
-    with _opened(file) as image:
+def _each(read: Callable[[Source], _T], sources: Iterable[Source]) -> Iterator[tuple[Source, _T]]:
+    """What `read` makes of each source, in order, some at a time: decoders and NumPy let other threads run.
+
+    What cannot be read is logged and left out.
+    """
+    with ThreadPoolExecutor(min(_MOST_AT_ONCE, core_count())) as threads:
+        reading = {source: threads.submit(read, source) for source in sources}
+        for source, result in reading.items():
+            try:
+                yield source, result.result()
+            except OSError as error:
+                log.warning("texture %s: %s", source.file.path, error)
+
+
+def _read_header(source: Source) -> _Header:
+    with _opened(source.file) as image:
         spec = image.spec()
         modes = str(spec.getattribute("wrapmodes") or "").split(",")
         wrap = _WRAPS.get(modes[0], "black"), _WRAPS.get(modes[-1], "black")
@@ -131,14 +142,14 @@ def _read_image(source: Source, header: _Header, side: int) -> TexelImage:
     if max(header.width, header.height) > side:
         log.info("texture %s: reduced to %d texels a side", source.file.path, side)
     if max(pixels.shape[:2]) > side:
-        pixels = _reduced(pixels, side, srgb=srgb and header.eight_bit)
+        pixels = reduced(pixels, side, srgb=srgb and header.eight_bit)
     texels = _four_channels(pixels) if colored or header.channels == 2 or srgb else pixels
     eight_bit = header.eight_bit
     if source.color_space not in STATED_SPACES:
         texels, eight_bit = _in_rec709(texels, source), False
     if not eight_bit:
-        texels = _half(_linear(texels) if srgb else texels)
-    return TexelImage(np.ascontiguousarray(texels[::-1]), srgb and eight_bit, header.wrap)
+        texels = _half(_in_light(texels) if srgb else texels)
+    return TexelImage(texels[::-1], srgb and eight_bit, header.wrap)
 
 
 def _in_rec709(texels: NDArray[Any], source: Source) -> NDArray[np.float32]:
@@ -159,67 +170,19 @@ def _level(image: oiio.ImageInput, side: int) -> int:
     return level
 
 
-def _reduced(pixels: NDArray[Any], side: int, *, srgb: bool) -> NDArray[Any]:
-    """No side longer than `side`: by means of 2x2, as mip levels are made, as far as those go.
-
-    srgb: bytes are sRGB-encoded, and light is what is averaged.
-    """
-    height, width = pixels.shape[:2]
-    while max(height, width) >= 2 * side and height % 2 == width % 2 == 0:
-        pixels = _halved_in_light(pixels) if srgb else _halved(pixels)
-        height, width = pixels.shape[:2]
-    scale = side / max(width, height)
-    if scale >= 1.0:
-        return pixels
-    return _resampled(pixels, max(1, round(width * scale)), max(1, round(height * scale)))
-
-
-def _halved(pixels: NDArray[Any]) -> NDArray[Any]:
-    """Means of 2x2 of (even, even, C); integers are rounded half up."""
-    wide = {"uint8": np.uint16, "uint16": np.uint32}.get(pixels.dtype.name, np.float32)
-    rows = np.add(pixels[0::2], pixels[1::2], dtype=wide)
-    sums = rows[:, 0::2] + rows[:, 1::2]
-    return sums * np.float32(0.25) if wide is np.float32 else ((sums + 2) >> 2).astype(pixels.dtype)
-
-
-def _halved_in_light(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The same of sRGB-encoded colours; alpha is not encoded."""
-    color = _encoding()[_halved(_LIGHT[pixels[..., :3]])]
-    return np.concatenate([color, _halved(pixels[..., 3:])], axis=2)
-
-
-@cache
-def _encoding() -> NDArray[np.uint8]:
-    """(65536,) of each such light the nearest code."""
-    edges = (_LIGHT[1:].astype(np.uint32) + _LIGHT[:-1] + 1) // 2
-    return np.searchsorted(edges, np.arange(65536), "right").astype(np.uint8)
-
-
-def _resampled(pixels: NDArray[Any], width: int, height: int) -> NDArray[Any]:
-    size = oiio.ROI(0, width, 0, height, 0, 1, 0, pixels.shape[2])
-    kind = {"uint8": oiio.UINT8, "float16": oiio.HALF}.get(pixels.dtype.name, oiio.FLOAT)
-    buffer = oiio.ImageBufAlgo.resize(oiio.ImageBuf(np.ascontiguousarray(pixels)), roi=size)
-    return np.asarray(buffer.get_pixels(kind))
-
-
 def _four_channels(pixels: NDArray[Any]) -> NDArray[Any]:
     """As the UsdUVTexture schema says: one channel repeats, two are gray and alpha, a missing alpha is 1."""
-    opaque = 255 if pixels.dtype == np.uint8 else 1
     channels = pixels.shape[2]
-    color = pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
-    alpha = pixels[..., -1:] if channels in (2, 4) else np.full_like(pixels[..., :1], opaque)
-    return np.concatenate([color, alpha], axis=2)
+    four = np.empty((*pixels.shape[:2], 4), pixels.dtype)
+    for channel in range(3):
+        four[..., channel] = pixels[..., channel if channels >= 3 else 0]
+    four[..., 3] = pixels[..., -1] if channels in (2, 4) else 255 if pixels.dtype == np.uint8 else 1
+    return four
 
 
-def _linear(texels: NDArray[Any]) -> NDArray[Any]:
-    """sRGB's transfer curve undone on the colours: IEC 61966-2-1."""
-    color = texels[..., :3]
-    curved = ((np.maximum(color, 0.04045) + 0.055) / 1.055) ** 2.4
-    return np.concatenate([np.where(color <= 0.04045, color / 12.92, curved), texels[..., 3:]], axis=-1)
-
-
-_LIGHT = np.round(65535.0 * _linear(np.arange(256)[:, None] / 255.0)[:, 0]).astype(np.uint16)
-"""(256,) of each code of sRGB the light, 65535 for white."""
+def _in_light(texels: NDArray[Any]) -> NDArray[Any]:
+    """sRGB's curve undone on the colours."""
+    return np.concatenate([linear(texels[..., :3]), texels[..., 3:]], axis=-1)
 
 
 def _half(texels: NDArray[Any]) -> NDArray[np.float16]:

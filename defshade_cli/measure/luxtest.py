@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.reading import read
+from defshade_cli.image.transfer import linear
 from defshade_cli.measure.brdf import evaluate_brdf
 from defshade_cli.measure.layouts import replace_generated
 from defshade_cli.measure.reference import surface_from_planes
@@ -133,9 +134,8 @@ def _tinted(image: Array, scene: Scene) -> Array:
 
 
 def _linear(picture: Path) -> Array:
-    """(H, W, 3) of 8 bits sRGB-encoded: IEC 61966-2-1."""
-    c = next(iter(read(picture).values()))[..., :3].astype(np.float64)
-    return np.where(c > 0.04045, ((c + 0.055) / 1.055) ** 2.4, c / 12.92)
+    """(H, W, 3) of 8 bits sRGB-encoded."""
+    return linear(next(iter(read(picture).values()))[..., :3].astype(np.float64))
 
 
 def _blocks(image: Array) -> Array:

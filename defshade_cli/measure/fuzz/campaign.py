@@ -11,9 +11,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from defshade_cli.farm.limits import Limits
-from defshade_cli.farm.local import LocalEngine, core_count
+from defshade_cli.farm.local import LocalEngine
 from defshade_cli.farm.tasks import Chunk, Outcome
 from defshade_cli.measure.fuzz.corpus import Case, Corpus
+from defshade_cli.resources import core_count
 from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
 
 _SECONDS = 10.0
