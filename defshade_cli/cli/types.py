@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import click
+from click.shell_completion import CompletionItem
 
 from defshade_cli.errors import UsageError
 from defshade_cli.settings import VariantChoice
@@ -88,6 +89,9 @@ class Direction(click.ParamType):
             self.fail(f"{value!r} is none of {known}, nor an azimuth and an elevation such as 30,20", param, ctx)
         return float(match[1]), float(match[2])
 
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        return [CompletionItem(name) for name in self.names if name.startswith(incomplete)]
+
 
 class Positive(Finite):
     """A finite float above 0."""
@@ -163,6 +167,9 @@ class Names(click.ParamType):
                 self.fail(f"unknown {self.noun} {name!r}; {_suggestion(name, self.choices)}", param, ctx)
         return tuple(dict.fromkeys(names))
 
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        return _list_with(self.choices, incomplete)
+
 
 class Layers(click.ParamType):
     """Names of layers, ours or another renderer's, separated by commas → ours; `all` for every one of the table."""
@@ -177,6 +184,11 @@ class Layers(click.ParamType):
             return resolve(names)
         except UsageError as error:
             self.fail(str(error), param, ctx)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        from defshade_cli.image.layers import FAMILIES, LAYERS
+
+        return _list_with([*LAYERS, *FAMILIES], incomplete)
 
 
 class Variant(click.ParamType):
@@ -244,6 +256,20 @@ class Amount(click.ParamType):
         if not name or not number:
             self.fail(f"{value!r} is no amount such as GPU=1", param, ctx)
         return name, Finite().convert(number, param, ctx)
+
+
+def file_completion(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """The shell's own, of files and folders: for names with tokens in them, which click does not know to be paths."""
+    return [CompletionItem(incomplete, type="file")]
+
+
+def _list_with(choices: Sequence[str], incomplete: str) -> list[CompletionItem]:
+    """What the last name of a list with commas between may become; the names before it are kept, and not offered."""
+    before, comma, begun = incomplete.rpartition(",")
+    given = before.split(",")
+    return [
+        CompletionItem(f"{before}{comma}{name}") for name in choices if name.startswith(begun) and name not in given
+    ]
 
 
 def _suggestion(name: str, choices: Sequence[str]) -> str:

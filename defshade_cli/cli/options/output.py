@@ -8,7 +8,7 @@ import click
 
 from defshade_cli import settings
 from defshade_cli.cli.options.option import Function, Option
-from defshade_cli.cli.types import OneOf
+from defshade_cli.cli.types import OneOf, file_completion
 from defshade_cli.settings import OutputSettings
 
 _OUTPUT = OutputSettings()
@@ -24,6 +24,7 @@ def output_options(name: str) -> list[Function]:
             "patterns",
             multiple=True,
             metavar="FILE",
+            shell_complete=file_completion,
             default_text=f"{name}.exr; {name}.####.exr for several frames",
             help="File to write, repeatable; the suffix picks the format. "
             "Tokens: {scene}, {camera}, and the frame as ####, %04d or $F4.",
