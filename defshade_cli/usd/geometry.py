@@ -122,8 +122,8 @@ def read_surface(
     said, subsets: of the prim, where they are known, see subsets.material_subsets.
     """
     issues: list[str] = []
-    path = str(prim.GetPath())
     said = said or said_of(prim)
+    path = said.path
     polygons, copies, strands = _read_shape(prim, said, time, issues, color, as_cages)
     if polygons is None:
         return None
@@ -256,7 +256,7 @@ def _is_double_sided(prim: Usd.Prim, said: Said) -> bool:
     """Planes are, unless they say otherwise."""
     if "doubleSided" in said.names:
         return bool(prim.GetAttribute("doubleSided").Get())
-    return _doubles_sides(prim.GetTypeName())
+    return _doubles_sides(said.type_name)
 
 
 @cache

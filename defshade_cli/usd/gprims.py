@@ -113,7 +113,7 @@ def read_solid(
 
     as_cage: a curved solid is the cage that Hydra subdivides.
     """
-    build, names = _GPRIMS.get(prim.GetTypeName(), (None, ()))
+    build, names = _GPRIMS.get(said.type_name, (None, ()))
     if build is None:
         return None
     build = _CAGES.get(build, build) if as_cage else build

@@ -46,8 +46,8 @@ class Memory:
         self.xforms = UsdGeom.XformCache()
         self._stage, self._extras, self._as_cages = stage, extras, as_cages
         self._shapes = Shapes()
-        self._surfaces: dict[Sdf.Path, tuple[Usd.TimeCode, Surface | None]] = {}
-        self._time_varying: dict[Sdf.Path, bool] = {}
+        self._surfaces: dict[str, tuple[Usd.TimeCode, Surface | None]] = {}
+        self._time_varying: dict[str, bool] = {}
         self._bindings: dict[str, Bound] = {"/": NOTHING_ABOVE}
         self._materials: dict[Sdf.Path, ReadMaterial] = {}
         self._first_instances: dict[str, str] = {}
@@ -66,12 +66,11 @@ class Memory:
 
     def surface(self, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Surface | None:
         """The same object at every time, unless something of the prim varies."""
-        path = prim.GetPath()
-        time_read, known = self._surfaces.get(path, (None, None))
+        time_read, known = self._surfaces.get(said.path, (None, None))
         if time_read is not None and (time == time_read or not self._is_time_varying(prim, said)):
             return known
         surface = self._at_another_time(known, prim, time, said) if known else self._read_surface(prim, time, said)
-        self._surfaces[path] = time, surface
+        self._surfaces[said.path] = time, surface
         return surface
 
     def _at_another_time(self, known: Surface, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Surface | None:
@@ -82,7 +81,7 @@ class Memory:
 
     def _read_surface(self, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Surface | None:
         subsets = material_subsets(prim)
-        bound = self._bound(str(prim.GetPath()), said.names)
+        bound = self._bound(said.path, said.names)
         surface = read_surface(
             prim,
             time,
@@ -155,11 +154,10 @@ class Memory:
 
     def _is_time_varying(self, prim: Usd.Prim, said: Said) -> bool:
         """Asked only when a second frame is read."""
-        path = prim.GetPath()
-        if path not in self._time_varying:
+        if said.path not in self._time_varying:
             color = self._color_primvar(prim, material_subsets(prim), Usd.TimeCode.Default())
-            self._time_varying[path] = is_time_varying(prim, color, self._extras.primvars, said)
-        return self._time_varying[path]
+            self._time_varying[said.path] = is_time_varying(prim, color, self._extras.primvars, said)
+        return self._time_varying[said.path]
 
     def _as_shown(self, surface: Surface) -> Surface:
         shown = self.shown(surface.path)

@@ -169,8 +169,8 @@ class Polygons:
             named = (self.normals, self.display_color, self.display_opacity, *self.uvs.values(), *self.shown.values())
             said += [primvar and primvar.interpolation for primvar in named]
             arrays += [primvar.values for primvar in named if primvar]
-        said += [array.dtype.char for array in arrays]
-        said += [array.shape for array in arrays]
+        for array in arrays:
+            said += array.dtype.char, array.shape
         if len(self.indices) <= _FEW_CORNERS:
             return tuple(said), b"".join([array.tobytes() for array in arrays])
         found = blake2b(digest_size=16)

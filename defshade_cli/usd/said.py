@@ -9,8 +9,13 @@ from pxr import Usd
 
 
 class Said(NamedTuple):
-    """names: of the properties authored on a prim.  primvars: may any lie on it, its own or an ancestor's?"""
+    """path, type_name: of a prim.  names: of the properties authored on it.
 
+    primvars: may any lie on it, its own or an ancestor's?
+    """
+
+    path: str
+    type_name: str
     names: Collection[str]
     primvars: bool
 
@@ -18,4 +23,5 @@ class Said(NamedTuple):
 def said_of(prim: Usd.Prim, *, primvars_above: bool = True) -> Said:
     """primvars_above: may an ancestor have some?"""
     names = prim.GetAuthoredPropertyNames()
-    return Said(names, primvars_above or "\nprimvars:" in "\n" + "\n".join(names))
+    primvars = primvars_above or "\nprimvars:" in "\n" + "\n".join(names)
+    return Said(str(prim.GetPath()), prim.GetTypeName(), names, primvars)

@@ -104,7 +104,7 @@ class Traversal:
         if here.draw_mode not in (None, FULL) and takes_effect(prim):
             pieces.append(self._stand_in(prim, here))
             return (), here
-        pieces.extend(self._own_pieces(prim, kind, here, said))
+        pieces += self._own_pieces(prim, kind, here, said)
         if self._is_hidden(prim) and (kind is Kind.POINT_INSTANCER or prim.IsInstance()):
             return (), here
         if kind is Kind.POINT_INSTANCER:
@@ -147,18 +147,20 @@ class Traversal:
         self.dormant |= visibility.ValueMightBeTimeVarying()
         return False
 
-    def _own_pieces(self, prim: Usd.Prim, kind: Kind, here: Standing, said: Said) -> Iterator[Piece]:
-        """What the prim itself is, whatever stands below it."""
+    def _own_pieces(self, prim: Usd.Prim, kind: Kind, here: Standing, said: Said) -> list[Piece]:
+        """What the prim itself is, whatever stands below it: a light, a surface, both or neither."""
+        found: list[Piece | None] = []
         if self._is_hidden(prim):
-            return
+            return []
         if is_light(prim):
-            yield from self._light(prim, here)
+            found.append(self._light(prim, here))
         if kind is Kind.GPRIM and here.purpose in (None, *self._purposes):
-            yield from self._gprim(prim, here, said)
+            found.append(self._gprim(prim, here, said))
         elif kind is Kind.UNDRAWN:
             self._report(prim, f"prims of type {prim.GetTypeName()} are not drawn")
         elif kind is Kind.UNKNOWN:
             self._report(prim, f"no schema defines the type {prim.GetTypeName()}")
+        return [piece for piece in found if piece]
 
     def _stand_in(self, prim: Usd.Prim, here: Standing) -> Piece:
         """What is drawn in place of a model."""
@@ -166,30 +168,30 @@ class Traversal:
         self.issues.update(dict.fromkeys(surface.issues))
         return self._piece(prim, here, surface, {path: bound_to(path) for path in surface.groups})
 
-    def _light(self, prim: Usd.Prim, here: Standing) -> Iterator[Piece]:
+    def _light(self, prim: Usd.Prim, here: Standing) -> Piece | None:
         """A light with a shape of its own; portals and surfaces that glow are noted."""
         path = self._memory.shown(prim.GetPath())
         if prim.IsA(UsdLux.PortalLight):
             self.portals.append(path)
-            return
+            return None
         light, issues = read_light(prim, self._time)
         self._report(prim, *(issue.reason for issue in issues))
         if isinstance(light, Glow):
             self.glows[light.surface or path] = light
-        elif light is not None:
-            yield self._piece(prim, here, light)
+            return None
+        return None if light is None else self._piece(prim, here, light)
 
-    def _gprim(self, prim: Usd.Prim, here: Standing, said: Said) -> Iterator[Piece]:
+    def _gprim(self, prim: Usd.Prim, here: Standing, said: Said) -> Piece | None:
         surface = self._memory.surface_around(prim, self._time, self._base, said)
         if surface is None:
             self._report(prim, f"prims of type {prim.GetTypeName()} are not drawn")
-            return
+            return None
         if surface.groups and here.rig:
             surface, here = self._deformed(prim, surface, here, here.rig)
         if surface.issues:
             self.issues.update(dict.fromkeys(surface.issues))
         self.dormant |= not surface.groups and is_time_varying(prim)
-        yield self._piece(prim, here, surface, {path: self._memory.bindings(path) for path in surface.groups})
+        return self._piece(prim, here, surface, {path: self._memory.bindings(path) for path in surface.groups})
 
     def _deformed(self, prim: Usd.Prim, rest: Surface, here: Standing, rig: Rig) -> tuple[Surface, Standing]:
         """The surface as its skeleton bends it, standing where that does."""

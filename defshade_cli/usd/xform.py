@@ -15,7 +15,7 @@ IDENTITY = Gf.Matrix4d(1.0)
 
 def matrix(gf: Gf.Matrix4d) -> Matrix:
     """(4, 4) float64 `b_from_a` of (4, 4), (4, 4), USD's "a to b"."""
-    return np.array(gf, np.float64).T.copy()
+    return np.frombuffer(gf).reshape(4, 4).T.copy()
 
 
 def gf_matrix(b_from_a: Matrix) -> Gf.Matrix4d:
