@@ -96,10 +96,109 @@ def test_bad_patches_are_left_out_and_said(attribute: str, value: object, reason
     assert reasons(drawn) == [f"it is left out: {reason}"] and not drawn.surface.groups
 
 
-def test_trim_curves_are_said_to_be_ignored() -> None:
+def sheet() -> UsdGeom.NurbsPatch:
+    """The square from 0 to 4 in the plane z = 0, along which u and v are x and y."""
+    grid = np.stack(np.meshgrid(np.linspace(0, 4, 2), np.linspace(0, 4, 2)), axis=-1)
+    knots = [0.0, 0.0, 4.0, 4.0]
+    return patch(np.concatenate([grid, np.zeros((2, 2, 1))], axis=-1), (2, 2, knots), (2, 2, knots))
+
+
+def circle(radius: float, center: tuple[float, float] = (2.0, 2.0), *, clockwise: bool = False) -> NDArray:
+    """(9, 3) homogeneous points of a rational circle."""
+    points = np.column_stack([(CIRCLE * radius + center) * WEIGHTS[:, None], WEIGHTS])
+    return points[::-1] if clockwise else points
+
+
+def trimmed(schema: UsdGeom.NurbsPatch, *circles: NDArray) -> UsdGeom.NurbsPatch:
+    """With a loop a circle."""
+    count = len(circles)
+    schema.CreateTrimCurveCountsAttr([1] * count)
+    schema.CreateTrimCurveOrdersAttr([3] * count)
+    schema.CreateTrimCurveVertexCountsAttr([9] * count)
+    schema.CreateTrimCurveKnotsAttr(CIRCLE_KNOTS * count)
+    schema.CreateTrimCurveRangesAttr([(0.0, 4.0)] * count)
+    schema.CreateTrimCurvePointsAttr([tuple(map(float, point)) for loop in circles for point in loop])
+    return schema
+
+
+def area(schema: UsdGeom.NurbsPatch) -> float:
+    drawn = read(schema)
+    assert not drawn.issues
+    a, b, c = drawn.mesh.points[drawn.mesh.triangles].astype(float).swapaxes(0, 1)
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+@pytest.mark.parametrize(
+    ("circles", "expected"),
+    [
+        ([circle(1.0)], math.pi),
+        ([circle(1.5), circle(0.5, clockwise=True)], math.pi * 2.0),
+        ([circle(1.5), circle(0.5)], math.pi * 2.0),
+        ([circle(1.5), circle(1.0, clockwise=True), circle(0.5)], math.pi * 1.5),
+        ([circle(1.0, clockwise=True)], 16.0 - math.pi),
+        ([circle(0.75, (1.0, 1.0)), circle(0.75, (3.0, 3.0))], math.pi * 1.125),
+        ([circle(1.0, (4.0, 2.0))], math.pi / 2.0),
+        ([circle(1.0, (4.0, 4.0), clockwise=True)], 16.0 - math.pi / 4.0),
+        ([circle(9.0)], 16.0),
+    ],
+)
+def test_trim_curves_bound_what_is_drawn(circles: list[NDArray], expected: float) -> None:
+    assert area(trimmed(sheet(), *circles)) == pytest.approx(expected, rel=2e-3)
+
+
+def test_a_trim_of_several_curves_is_exact_where_they_are_lines() -> None:
+    corners = [(0.5, 0.5), (3.5, 0.5), (2.0, 3.0)]
+    schema = sheet()
+    schema.CreateTrimCurveCountsAttr([3])
+    schema.CreateTrimCurveOrdersAttr([2] * 3)
+    schema.CreateTrimCurveVertexCountsAttr([2] * 3)
+    schema.CreateTrimCurveKnotsAttr([0.0, 0.0, 1.0, 1.0] * 3)
+    schema.CreateTrimCurveRangesAttr([(0.0, 1.0)] * 3)
+    schema.CreateTrimCurvePointsAttr([(*corners[(i + k) % 3], 1.0) for i in range(3) for k in range(2)])
+    assert area(schema) == pytest.approx(0.5 * 3.0 * 2.5, rel=1e-6)
+
+
+def test_a_trimmed_tube_keeps_its_shape_and_coordinates() -> None:
     schema = tube()
+    set_primvar(schema, "st", [(x, y) for y in (0.0, 1.0) for x in range(9)], "vertex", "texCoord2f[]")
+    drawn = read(trimmed(schema, circle(0.4, (2.0, 0.5))))
+    used = np.unique(drawn.mesh.triangles)
+    points, normals = drawn.mesh.points[used], drawn.mesh.normals[used]
+    np.testing.assert_allclose(np.linalg.norm(points[:, :2], axis=1), 1, rtol=1e-6)
+    np.testing.assert_allclose(normals, points * (1, 1, 0), atol=1e-5)
+    np.testing.assert_allclose(points[:, 2], 2 * drawn.mesh.uvs["st"][used, 1], atol=1e-6)
+    assert (points[:, 0] < -0.7).all() and 0.2 - 1e-6 <= points[:, 2].min() <= points[:, 2].max() <= 1.8 + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("attribute", "value", "reason"),
+    [
+        ("counts", [2], "they are not 2 curves"),
+        ("orders", [10], "a curve has fewer points than its order"),
+        ("knots", [0.0, 1.0], "they have not 9 points and 12 knots"),
+        (
+            "knots",
+            CIRCLE_KNOTS[::-1],
+            "a curve has descending knots, an empty range, or weights that are not positive",
+        ),
+    ],
+)
+def test_trim_curves_that_do_not_fit_are_said_to_be_ignored(attribute: str, value: object, reason: str) -> None:
+    schema = trimmed(sheet(), circle(1.0))
+    schema.GetPrim().GetAttribute(f"trimCurve:{attribute}").Set(value)
+    drawn = read(schema)
+    assert reasons(drawn) == [f"trim curves are ignored: {reason}"] and len(drawn.mesh.triangles) == 2
+
+
+def test_missing_trim_attributes_are_said() -> None:
+    schema = sheet()
     schema.CreateTrimCurveCountsAttr([1])
-    assert reasons(read(schema)) == ["trim curves are ignored: the whole patch is drawn"]
+    assert reasons(read(schema)) == ["trim curves are ignored: trimCurve:orders is missing or of another type"]
+
+
+def test_a_trim_that_leaves_nothing_is_said() -> None:
+    drawn = read(trimmed(sheet(), circle(1.0, (9.0, 9.0))))
+    assert reasons(drawn) == ["its trim curves leave nothing of it"] and not drawn.surface.groups
 
 
 def test_moving_points_make_the_patch_vary() -> None:

@@ -1,0 +1,142 @@
+"""Trim curves: which part of a NurbsPatch is drawn, and triangles of that part alone.
+
+Loops of rational B-splines bound it in parameter space. As RenderMan's RiTrimCurve has it, which the schema follows,
+inside is what an odd number of loops enclose, and what lies to the left of the curves; so a lone clockwise loop is a
+hole.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+Array = NDArray[np.float64]
+
+_WIDTHS = {"counts": 1, "orders": 1, "vertexCounts": 1, "knots": 1, "ranges": 2, "points": 3}
+TRIM_ATTRIBUTES = tuple(f"trimCurve:{name}" for name in _WIDTHS)
+
+_STEPS = 16
+"""Segments along a span of a curve."""
+_LONGEST = 0.5
+"""Segment along a loop, where the samples of the patch are 1 apart."""
+_BESIDE = _LONGEST / np.sqrt(2.0)
+"""Samples nearer than this to a loop's points give way: then no circle over a segment holds one, and Delaunay's
+triangles have the segment as an edge."""
+
+
+def read_loops(patch: UsdGeom.NurbsPatch, time: Usd.TimeCode) -> list[Array]:
+    """(N, 2) u and v along each loop. Raises ValueError with the reason where the attributes do not fit each other."""
+    prim = patch.GetPrim()
+    counts, orders, sizes, knots, ranges, points = (_values(prim, name, time) for name in _WIDTHS)
+    curves = int(counts.sum())
+    if len(orders) != curves or len(sizes) != curves or len(ranges) != curves or (counts < 1).any():
+        raise ValueError(f"they are not {curves} curves")
+    if (orders < 2).any() or (sizes < orders).any():
+        raise ValueError("a curve has fewer points than its order")
+    if len(points) != sizes.sum() or len(knots) != (sizes + orders).sum():
+        raise ValueError(f"they have not {sizes.sum()} points and {(sizes + orders).sum()} knots")
+    ends, knot_ends = _ends(sizes), _ends(sizes + orders)
+    traced = [
+        _traced(int(order) - 1, knots[knot_ends[i] : knot_ends[i + 1]], points[ends[i] : ends[i + 1]], ranges[i])
+        for i, order in enumerate(orders)
+    ]
+    return [np.concatenate(traced[first:end]) for first, end in pairwise(_ends(counts).tolist())]
+
+
+def inside(loops: list[Array], us: Array, vs: Array) -> tuple[Array, NDArray[np.int32]]:
+    """Of a patch that is sampled at `us` (M,) times `vs` (N,): points (P, 2), u and v, and triangles (T, 3) of them.
+
+    The triangles cover what is inside the loops, and have the loops as edges.
+    """
+    from scipy.spatial import Delaunay, cKDTree  # few stages have patches
+
+    rows, columns = np.arange(len(vs), dtype=float), np.arange(len(us), dtype=float)
+    traced = [_no_longer(np.column_stack([_at(us, columns, loop[:, 0]), _at(vs, rows, loop[:, 1])])) for loop in loops]
+    edge = np.concatenate(traced).clip(0.0, (columns[-1], rows[-1]))
+    samples = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+    on_border = ((samples == 0.0) | (samples == samples[-1])).any(axis=1)
+    apart = cKDTree(edge).query(samples)[0] > np.where(on_border, 0.0, _BESIDE)
+    points = np.unique(np.concatenate([edge, samples[apart]]).round(9), axis=0)
+    triangles = Delaunay(points).simplices
+    corners = points[triangles]
+    (a, b), (c, d) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+    drawn = triangles[(a * d - b * c > 1e-9) & _enclosed(corners.mean(axis=1), traced)]
+    return np.column_stack([np.interp(points[:, 0], columns, us), np.interp(points[:, 1], rows, vs)]), drawn
+
+
+def _values(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> NDArray[Any]:
+    """(N,) or (N, width). Raises ValueError for what holds other than so many finite numbers."""
+    width = _WIDTHS[name]
+    values = np.asarray(prim.GetAttribute(f"trimCurve:{name}").Get(time))
+    if values.dtype.kind not in "iuf" or values.shape[1:] != (() if width == 1 else (width,)):
+        raise ValueError(f"trimCurve:{name} is missing or of another type")
+    if not np.isfinite(values).all():
+        raise ValueError(f"trimCurve:{name} is not finite")
+    return values
+
+
+def _ends(counts: NDArray[Any]) -> NDArray[np.int64]:
+    """(N + 1,) where runs of so many begin, and where the last ends."""
+    return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
+
+
+def _traced(degree: int, knots: Array, points: Array, within: Array) -> Array:
+    """(N, 2) along a curve of homogeneous points (M, 3), over its range. Raises ValueError."""
+    low, high = np.clip(within, knots[degree], knots[-degree - 1])
+    if (np.diff(knots) < 0.0).any() or not low < high or not (points[:, 2] > 0.0).all():
+        raise ValueError("a curve has descending knots, an empty range, or weights that are not positive")
+    from scipy.interpolate import BSpline
+
+    spans = np.unique([low, high, *knots[(knots > low) & (knots < high)]])
+    at = np.append((spans[:-1, None] + np.diff(spans)[:, None] * (np.arange(_STEPS) / _STEPS)).ravel(), high)
+    homogeneous = BSpline(knots, points, degree)(at)
+    return homogeneous[:, :2] / homogeneous[:, 2:]
+
+
+def _at(samples: Array, numbers: Array, parameters: Array) -> Array:
+    """Where parameters lie among samples: between two at what is no whole number, beyond them as the last two go on."""
+    before = np.minimum(parameters - samples[0], 0.0) / (samples[1] - samples[0])
+    after = np.maximum(parameters - samples[-1], 0.0) / (samples[-1] - samples[-2])
+    return np.interp(parameters, samples, numbers) + before + after
+
+
+def _no_longer(loop: Array) -> Array:
+    """(N, 2) the closed loop in segments of no more than _LONGEST."""
+    ahead = np.roll(loop, -1, axis=0) - loop
+    parts = np.ceil(np.linalg.norm(ahead, axis=1) / _LONGEST).astype(int)
+    part = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+    return np.repeat(loop, parts, axis=0) + np.repeat(ahead, parts, axis=0) * (part / np.repeat(parts, parts))[:, None]
+
+
+def _enclosed(points: Array, loops: list[Array]) -> NDArray[np.bool_]:
+    """(P,) which points are inside."""
+    first = np.concatenate(loops)
+    last = np.concatenate([np.roll(loop, -1, axis=0) for loop in loops])
+    odd = _crossings(points, first, last) % 2 == 1
+    outermost = max((_twice_area(loop) for loop in loops), key=abs)
+    return odd if outermost >= 0.0 else ~odd
+
+
+def _twice_area(loop: Array) -> float:
+    """Negative for a clockwise one."""
+    (x, y), (next_x, next_y) = loop.T, np.roll(loop, -1, axis=0).T
+    return float(x @ next_y - y @ next_x)
+
+
+def _crossings(points: Array, first: Array, last: Array) -> NDArray[np.intp]:
+    """(P,) how many of the segments (S, 2) to (S, 2) a ray from each point along the first axis crosses.
+
+    A segment is compared with the points beside it alone, which it finds among them in order of height.
+    """
+    order = np.argsort(points[:, 1])
+    low, high = np.searchsorted(points[order, 1], np.sort([first[:, 1], last[:, 1]], axis=0))
+    beside = high - low
+    segment = np.repeat(np.arange(len(first)), beside)
+    point = order[np.arange(len(segment)) + np.repeat(low - np.cumsum(beside) + beside, beside)]
+    (x, y), (along_x, along_y) = first[segment].T, (last - first)[segment].T
+    at = x + (points[point, 1] - y) * along_x / along_y
+    return np.bincount(point[at > points[point, 0]], minlength=len(points))
