@@ -15,7 +15,7 @@ from defshade_cli.image.sizes import fitted
 TILE = 480
 """Pixels: the greatest width of a tile."""
 
-_GAP, _STRIP = 8, 44
+_GAP, _STRIP, _NAME = 8, 44, 24
 _TEXT, _QUIET = (0.93, 0.93, 0.92), (0.62, 0.63, 0.65)
 
 
@@ -35,13 +35,14 @@ def contact_sheet(looks: Mapping[str, Look]) -> Pixels:
 
 
 def _tile(name: str, look: Look) -> Pixels:
-    """The layer over a strip with its name and, to the right, its legend."""
+    """The layer over a strip with its name and, to the right, its legend: beside the name alone where that has room."""
     image = fitted(look.colors, TILE)
     strip = _panel(_STRIP, image.shape[1])
     legend = look.legend
     if legend is not None and legend.shape[1] + 12 <= image.shape[1]:
-        middle = (_STRIP - legend.shape[0]) // 2
-        strip[middle : middle + legend.shape[0], -legend.shape[1] - 6 : -6] = legend
+        room = _NAME if legend.shape[0] < _NAME else _STRIP
+        top = (room - legend.shape[0]) // 2
+        strip[top : top + legend.shape[0], -legend.shape[1] - 6 : -6] = legend
     strip = _written(strip, 6, 18, name, 16, _TEXT)
     return np.concatenate([image, _written(strip, 6, 36, look.caption, 12, _QUIET)])
 
