@@ -41,9 +41,8 @@ def _open(path: Path) -> oiio.ImageInput:
     config.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(str(path), config)
     if source is None:
-        if not path.exists():
-            raise OutputError(f"no such file: {path}")
-        raise OutputError(f"{path}: cannot be read: {oiio.geterror()}")
+        reason = oiio.geterror()  # else told when the process ends
+        raise OutputError(f"{path}: cannot be read: {reason}" if path.exists() else f"no such file: {path}")
     return source
 
 
