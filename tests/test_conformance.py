@@ -14,6 +14,7 @@ from hypothesis.extra.numpy import arrays
 from browser import needs_browser, told_by
 from defshade_cli.errors import UsageError
 from defshade_cli.gpu.context import Gpu
+from defshade_cli.image.snapshot import write_snapshot
 from defshade_cli.measure.conformance import batch
 from defshade_cli.measure.conformance.arnold import read_as_arnold
 from defshade_cli.measure.conformance.catalogue import assets_folder, read_item
@@ -76,6 +77,14 @@ def test_arnold_hides_geometry_from_the_camera_and_keeps_the_light_of_lights() -
     scene = StageReader(stage).read(None)
     assert [drawable.paths for drawable in scene.drawables] == [("/c",)]
     assert [light.path for light in scene.lights] == ["/l"]
+    np.testing.assert_array_equal(scene.drawables[0].display_color, [[1.0, 1.0, 1.0]])
+
+
+def test_arnolds_white_gives_way_to_a_colour_from_above() -> None:
+    colored = 'def Xform "x" {\n color3f[] primvars:displayColor = [(1, 0, 0)]\n def Cube "c" {}\n}'
+    stage = stage_of(colored)
+    read_as_arnold(stage)
+    np.testing.assert_array_equal(StageReader(stage).read(None).drawables[0].display_color, [[1.0, 0.0, 0.0]])
 
 
 def test_a_stage_without_references_is_a_case(tmp_path: Path) -> None:
@@ -215,12 +224,26 @@ def test_the_table_names_what_is_left_out(tmp_path: Path) -> None:
     assert "| a/<y>.usda | volumes are not drawn |" in table
 
 
-# A part of it, where the stages are
-
-
 @pytest.fixture(scope="module")
 def pipeline(gpu: Gpu) -> Pipeline:
     return Pipeline(gpu)
+
+
+def test_a_sky_that_the_reference_shows_is_drawn_and_covers_nothing(tmp_path: Path, pipeline: Pipeline) -> None:
+    """Half of white, with the π that stages without materials are exposed by."""
+    picture = np.full((12, 16, 3), 127, np.uint8)
+    picture[3:9, 4:12] = 0
+    (tmp_path / "reference").mkdir()
+    write_snapshot(picture / np.float32(255), tmp_path / "reference/cube_1.3.png")
+    sky = f'{CUBE}def DomeLight "sky" {{\n float inputs:intensity = 0.159\n}}\n'
+    plain = {**STORM, "resolution": [16, 12], "command": "test -frameAll -lighting -stage cube.usda"}
+    (case,) = read_item(item(tmp_path, plain, stage=sky))
+    drawn = draw(case, pipeline)
+    np.testing.assert_array_equal(drawn.pictures["ours"][0, 0], np.float32(127 / 255))
+    assert drawn.iou is not None and 0.0 < drawn.iou < 1.0
+
+
+# A part of it, where the stages are
 
 
 @pytest.mark.parametrize(

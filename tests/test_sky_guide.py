@@ -44,3 +44,9 @@ def test_a_mirror_looks_back_at_the_camera(pipeline: Pipeline) -> None:
 def test_a_matte_wall_looks_at_its_half_of_the_sky(pipeline: Pipeline) -> None:
     of = scene([quad(5.0)], [SKY], [replace(MIRROR, metallic=0.0)], camera(5.0, 0.1))
     assert (directions(pipeline, of)[:, 2] > 0.0).mean() > 0.7
+
+
+def test_nothing_is_looked_for_where_nothing_is_lit(pipeline: Pipeline) -> None:
+    of = scene([quad(5.0)], [SKY], [MIRROR], camera(5.0, 0.1))
+    film = pipeline.render(of, make_plan(of, RenderSettings(size=(8, 8), samples=2, layers=("alpha",))))
+    assert (film.layers["alpha"] == 1.0).all()

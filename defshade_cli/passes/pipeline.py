@@ -219,7 +219,7 @@ class Pipeline:
 
     def _guides(self, draws: DrawList, plan: Plan) -> SkyGuides:
         """Where in its domes' skies the image looks for light, if samples are drawn there."""
-        if not any(dome.points for dome in plan.domes):
+        if not (plan.lit and any(dome.points for dome in plan.domes)):
             return NO_GUIDES
         self._mask.hide(WHOLE[:0])
         small = scout(plan)

@@ -85,15 +85,16 @@ def draw(case: Case, pipeline: Pipeline) -> Drawn:
 def _compared(case: Case, drawn: Drawn, alpha: Picture, reference: Picture) -> Drawn:
     """With the reference, and with what its maker's conditions allow to be measured."""
     ours, theirs = drawn.pictures["ours"], _reference_shown(case, reference)
-    masks = None if case.maker == "viewer" else _masks(case, alpha, reference)
-    if masks is None:
-        return replace(drawn, pictures={"ours": ours, "reference": theirs})
-    return replace(
+    drawn = replace(
         drawn,
-        pictures={"ours": ours, "reference": theirs, "difference": _difference(ours, theirs, *masks)},
-        iou=intersection_over_union(*masks),
+        pictures={"ours": ours, "reference": theirs},
         rmse=float(np.sqrt(np.mean((ours - theirs) ** 2))) if case.maker in ("storm", "arnold") else None,
     )
+    masks = None if case.maker == "viewer" else _masks(case, alpha, reference)
+    if masks is None:
+        return drawn
+    difference = _difference(ours, theirs, *masks)
+    return replace(drawn, pictures=drawn.pictures | {"difference": difference}, iou=intersection_over_union(*masks))
 
 
 def _stage(case: Case) -> Any:
@@ -136,29 +137,34 @@ def _size(case: Case, reference: Picture | None) -> tuple[int, int]:
 
 
 def _shows_sky(case: Case, reference: Picture | None) -> bool:
-    """Storm's drawing test is asked not to; Arnold hides domes by a primvar of its own."""
-    if case.maker == "arnold" and reference is not None:
-        return bool((reference[[0, 0, -1, -1], [0, -1, 0, -1], 3] > HALF).any())
-    return case.maker != "storm"
+    """Whether the reference does: Storm's drawing test may be asked not to, Arnold has a primvar that hides domes."""
+    background = case.conditions.background
+    if reference is None or not (background or case.maker == "arnold"):
+        return True
+    corners = reference[[0, 0, -1, -1], [0, -1, 0, -1]]
+    return bool(mask_of_color(corners[:, :3], background).any() if background else (corners[:, 3] > HALF).any())
 
 
 def _render(
     case: Case, pipeline: Pipeline, scene: Scene, reader: StageReader, settings: RenderSettings
 ) -> tuple[Picture, Picture]:
-    """(H, W, 4) scene-linear, premultiplied, and (H, W) alpha; with Storm's samples where it drew the reference."""
+    """(H, W, 4) scene-linear, premultiplied, and (H, W) what geometry covers; where Storm drew, by its samples."""
     if case.maker not in ("storm", "usdrecord"):
         pixels = _filtered(pipeline, scene, reader, replace(settings, samples=SAMPLES[case.maker]))
         return pixels, pixels[..., 3]
-    if case.conditions.lighting == "unlit":
-        settings = replace(settings, layers=("depth", "albedo"))
+    unlit = case.conditions.lighting == "unlit"
+    settings = replace(settings, layers=("depth", "albedo" if unlit else "beauty"))
     cutout = make_plan(scene, settings).cutout
-    coins = replace(settings, layers=("alpha",), samples=OPACITY_SAMPLES, filter_width=_NARROWEST)
+    coins = replace(settings, layers=("alpha",), samples=OPACITY_SAMPLES, filter_width=_NARROWEST, background=False)
     places = _CENTRE if cutout and _blends(pipeline, scene, coins) else MULTISAMPLE
-    pixels = np.mean([_pixels(film) for film in _taken(pipeline, scene, settings, places)], axis=0)
-    if not cutout:
-        return pixels, pixels[..., 3]
-    alpha = [film.layers["alpha"][..., 0] for film in _taken(pipeline, scene, coins, places)]
-    return pixels, np.mean(alpha, axis=0)
+    films = list(_taken(pipeline, scene, settings, places))
+    pixels = np.mean([_pixels(film) for film in films], axis=0)
+    covered = (
+        [film.layers["alpha"][..., 0] for film in _taken(pipeline, scene, coins, places)]
+        if cutout
+        else [np.isfinite(film.layers["depth"][..., 0]) for film in films]
+    )
+    return pixels, np.mean(covered, axis=0)
 
 
 def _blends(pipeline: Pipeline, scene: Scene, coins: RenderSettings) -> bool:
