@@ -42,7 +42,7 @@ def render(job: RenderJob, reporting: Reporting) -> None:
 
 
 def execute(job: RenderJob, reporting: Reporting) -> None:
-    """Render `job`, telling of it as `reporting` says."""
+    """Render `job`, telling of it as `reporting` says. Raises the errors of errors.py."""
     from defshade_cli.rendering import run
 
     start_logging(reporting)

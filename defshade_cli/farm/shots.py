@@ -56,7 +56,10 @@ def make_shot(job: RenderJob, frame: float | None, product: Product, camera: str
 
 
 def layers_of(job: RenderJob, product: Product) -> tuple[str, ...]:
-    """The layers of an image: as asked, else what answers the product's variables, else the beauty."""
+    """The layers of an image: as asked, else what answers the product's variables, else the beauty.
+
+    Raises UsageError for a name that nobody has.
+    """
     return in_order(resolve(job.settings.layers or [v.layer for v in _variables(job, product)] or [BEAUTY]))
 
 

@@ -63,7 +63,10 @@ def _check_formats(files: Sequence[Path], job: RenderJob) -> None:
 
 
 def remove_leftovers(shots: Sequence[Shot]) -> None:
-    """Clear the folders of the shots' files of what killed renders left half written. Raises OutputError."""
+    """Clear the folders of the shots' files of what killed renders left half written.
+
+    Raises OutputError, and UsageError for a suffix of no known format.
+    """
     for folder in {file.parent for shot in shots for file in shot_files(shot)}:
         remove_abandoned(folder)
 

@@ -41,7 +41,10 @@ def targets(layers: Iterable[str], output: OutputSettings, path: Path) -> dict[P
 
 
 def pictures(layers: Iterable[str], output: OutputSettings, path: Path) -> set[tuple[str, bool]]:
-    """(layer, with alpha) of every colour that `write` puts through the display transform for `path`."""
+    """(layer, with alpha) of every colour that `write` puts through the display transform for `path`.
+
+    Raises UsageError for an unknown suffix.
+    """
     suffix = suffix_of(path)
     if suffix == EXR:
         return set()

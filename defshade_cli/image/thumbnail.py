@@ -16,7 +16,10 @@ _WIDTH = 240
 
 
 def thumbnails(path: Path) -> dict[str, str]:
-    """Layer → a picture as a `data:` address; layers without a look of their own are left out. Raises OutputError."""
+    """Layer → a picture as a `data:` address; layers without a look of their own are left out.
+
+    Raises OutputError for a file that cannot be read, UsageError for $OCIO without a display.
+    """
     layers = read(path)
     if suffix_of(path) != EXR:
         return {BEAUTY: jpeg_address(_reduced(layers[BEAUTY]))}

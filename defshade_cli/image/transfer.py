@@ -9,6 +9,6 @@ from numpy.typing import NDArray
 
 
 def linear(encoded: NDArray[Any]) -> NDArray[Any]:
-    """Light of sRGB's values, 1 for white: IEC 61966-2-1."""
+    """Light of sRGB's values (..., C), 1 for white, in their shape: IEC 61966-2-1."""
     curved = ((np.maximum(encoded, 0.04045) + 0.055) / 1.055) ** 2.4
     return np.where(encoded <= 0.04045, encoded / 12.92, curved)

@@ -18,7 +18,7 @@ from defshade_cli.settings import OutputSettings
 def verify(path: Path, film: Film, names: tuple[str, ...], output: OutputSettings) -> None:
     """Compare an EXR with the film, to the bit but for colours under a lossy compression; a picture by its size.
 
-    Raises OutputError that names what differs.
+    Raises OutputError that names what differs, UsageError for a suffix of no known format.
     """
     layers = read(path, data_window=True)
     if suffix_of(path) != EXR:

@@ -59,7 +59,7 @@ class Accuracy:
 def measure(
     pipeline: Pipeline, scene: Scene, size: tuple[int, int], samples: Iterable[int], reference_samples: int
 ) -> Accuracy:
-    """Render `scene` with each number of samples and compare with a path-traced reference."""
+    """Render `scene` with each number of samples and compare with a path-traced reference. Raises DefshadeError."""
     plans = {n: make_plan(scene, RenderSettings(size=size, samples=n, background=False)) for n in samples}
     reference = cached_reference(scene, next(iter(plans.values())), reference_samples)
     radiance = reference.radiance
@@ -73,7 +73,7 @@ def reference_noise(reference: Reference) -> float:
 
 
 def cached_reference(scene: Scene, plan: Plan, samples: int) -> Reference:
-    """path_traced, kept in CACHE."""
+    """path_traced, kept in CACHE. Raises DefshadeError as it does."""
     path = CACHE / f"{scene.name}-{_fingerprint(scene, plan.size, plan.exposure, samples)}.npy"
     if path.exists():
         return Reference(np.load(path))
@@ -123,7 +123,7 @@ def _row(stage: str, result: Accuracy) -> str:
 
 
 def main(page: Path) -> None:
-    """Measure every stage; progress goes to stderr."""
+    """Measure every stage; progress goes to stderr. Raises the errors of errors.py."""
     results: dict[str, Accuracy] = {}
     with Gpu() as gpu:
         pipeline = Pipeline(gpu)

@@ -50,7 +50,7 @@ class Claim:
 
 
 def measure_claim(pipeline: Pipeline, scene: Scene, settings: RenderSettings, limit: int) -> Claim:
-    """Render with `settings` and with `limit` samples, and compare."""
+    """Render with `settings` and with `limit` samples, and compare. Raises as make_plan: UsageError."""
     plan = make_plan(scene, replace(settings, layers=("beauty", "variance", "sampleCount")))
     film = pipeline.render(scene, plan).layers
     converged = pipeline.render(scene, make_plan(scene, RenderSettings(size=settings.size, samples=limit)))
@@ -87,7 +87,7 @@ def _all(claims: Mapping[str, Claim]) -> str:
 
 
 def main(page: Path, names: list[str]) -> None:
-    """Measure the stages, or those named; progress goes to stderr."""
+    """Measure the stages, or those named; progress goes to stderr. Raises the errors of errors.py."""
     claims: dict[str, Claim] = {}
     with Gpu() as gpu:
         pipeline = Pipeline(gpu)

@@ -28,7 +28,7 @@ _RULE = "|---|" + "---:|---:|" * len(LAYOUTS)
 
 
 def first_frame(path: Path) -> Scene:
-    """The stage at its first frame, seen by its own camera."""
+    """The stage at its first frame, seen by its own camera. Raises the errors of errors.py."""
     reader = StageReader(open_stage(path))
     return reader.read(reader.first_frame())
 
@@ -36,7 +36,10 @@ def first_frame(path: Path) -> Scene:
 def layout_errors(
     pipeline: Pipeline, scene: Scene, settings: RenderSettings, layouts: Iterable[Layout] = LAYOUTS
 ) -> dict[Layout, RelativeError]:
-    """Each layout's beauty against the reference, which is evaluated on the float GBuffer."""
+    """Each layout's beauty against the reference, which is evaluated on the float GBuffer.
+
+    Raises as make_plan: UsageError.
+    """
     plan = make_plan(scene, replace(settings, layout="float"))
     lights = [planned.light for planned in plan.lights]
     reference, _ = reference_radiance(
@@ -76,7 +79,10 @@ def referenced_stages() -> list[Path]:
 
 
 def main(page: Path) -> None:
-    """Measure every stage that has a reference, and write the table into the page."""
+    """Measure every stage that has a reference, and write the table into the page.
+
+    Raises the errors of errors.py.
+    """
     stages = referenced_stages()
     with Gpu() as gpu:
         pipeline = Pipeline(gpu)

@@ -84,7 +84,7 @@ def sweeps(assets: Path) -> Iterator[Sweep]:
 
 
 def agreement(pipeline: Pipeline, sweep: Sweep, samples: int = SAMPLES) -> Agreement:
-    """Render a sweep's frame and compare its floor."""
+    """Render a sweep's frame and compare its floor. Raises the errors of errors.py."""
     scene = _rough(StageReader(open_stage(sweep.stage)).read(sweep.frame))
     settings = RenderSettings(size=SIZE, samples=samples, shadows=False)
     lit, planes = _beauty(pipeline, scene, settings), pipeline.planes(scene, make_plan(scene, settings))

@@ -37,6 +37,7 @@ class DisplayPass:
         """(H, W, 3 or 4), premultiplied → the same shape in [0, 1], or of bytes, rounded.
 
         straight: colours come out without their alpha. A band of rows at a time, so that little memory is taken.
+        Raises GpuError.
         """
         self._gpu.make_current()
         height, width, channels = pixels.shape

@@ -37,7 +37,10 @@ class Frame:
         return self._gbuffers[planes, layout]
 
     def radiance(self, name: str, size: Size, gbuffer: GBuffer | None = None, components: int = 4) -> Target:
-        """A float target with one texture "radiance"; it tests against the depth of `gbuffer` where given."""
+        """A float target with one texture "radiance"; it tests against the depth of `gbuffer` where given.
+
+        Raises GpuError.
+        """
         self._resize(size)
         key = name, gbuffer
         if key not in self._radiance:

@@ -63,7 +63,10 @@ def volume_of(light: Light) -> Volume:
 def plan_lights(
     scene: Scene, exposure: float, settings: RenderSettings, layers: Sequence[str] = ()
 ) -> tuple[PlannedLight, ...]:
-    """Lights that shine, in the order of their volumes, with reach and group. exposure: the camera's factor."""
+    """Lights that shine, in the order of their volumes, with reach and group. exposure: the camera's factor.
+
+    Raises UsageError where a light is in more groups than a framebuffer takes.
+    """
     lights = enumerate(with_texture(light) for light in scene.lights)
     lit = [(number, light) for number, light in lights if _peak(light) > 0.0]
     response = max((_greatest_response(m, settings.shading) for m in scene.materials), default=1.0)

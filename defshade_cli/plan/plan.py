@@ -275,7 +275,10 @@ ShutterSample = tuple[Scene, Plan]
 
 
 def plan_moments(plan: Plan, seen: Iterator[Scene], settings: RenderSettings) -> Iterator[ShutterSample]:
-    """What the samples see in turn: `seen` with plans that fill the same planes, of the same texels."""
+    """What the samples see in turn: `seen` with plans that fill the same planes, of the same texels.
+
+    Raises as make_plan: UsageError.
+    """
     for moment in seen:
         planned = make_plan(moment, settings)
         yield moment, replace(planned, planes=plan.planes, transparent=plan.transparent, texels=plan.texels)

@@ -18,7 +18,10 @@ _WORTHWHILE = 2**18
 
 
 def shown(film: Film, shot: Shot, renderer: Renderer) -> Film:
-    """The film with what its pictures show, where they are large enough; the CPU shows the others when it writes."""
+    """The film with what its pictures show, where they are large enough; the CPU shows the others when it writes.
+
+    Raises UsageError for a suffix, display or view that does not exist.
+    """
     job, layers = shot.job, shot.job.settings.layers or ()
     wanted = {each for path in shot_paths(shot) for each in pictures(layers, job.output, path)}
     width, height = film.size

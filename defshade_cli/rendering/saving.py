@@ -16,7 +16,7 @@ _TYPES = {1: "float", 2: "float2", 3: "color3f", 4: "color4f"}
 
 
 def save_settings(job: RenderJob, scene: Scene, plan: Plan, path: Path) -> None:
-    """Write the RenderSettings that `job` amounts to. Raises OutputError."""
+    """Write the RenderSettings that `job` amounts to. Raises OutputError; UsageError for an unknown layer."""
     (width, height), window = plan.display, plan.window
     left, right = window.x / width, (window.x + window.width) / width
     bottom, top = 1.0 - (window.y + window.height) / height, 1.0 - window.y / height

@@ -34,7 +34,10 @@ class Sound:
 
 
 def sound(film: Film, scene: Scene, settings: RenderSettings, pipeline: Pipeline, on_nan: OnNan) -> Sound:
-    """The film after its check, whose findings go to the log; filled where that is asked."""
+    """The film after its check, whose findings go to the log; filled where that is asked.
+
+    Raises UsageError, as make_plan does.
+    """
     found = check(film)
     log.info("%s", found)
     if found.black == 1.0:

@@ -43,7 +43,10 @@ def read_products(stage: Usd.Stage, settings: str | None, frame: float | None) -
 
 
 def lost_products(stage: Usd.Stage, settings: str | None) -> Iterator[str]:
-    """A sentence for each product of the settings that read_products leaves out."""
+    """A sentence for each product of the settings that read_products leaves out.
+
+    Raises PrimNotFound for settings that the stage lacks.
+    """
     found = find_settings(stage, settings)
     if not found:
         return

@@ -135,7 +135,7 @@ class StageReader:
     def read_shutter(self, scene: Scene, count: int) -> Iterator[Scene]:
         """The frame of `scene` again and again, at `count` times of its shutter in turn, without end.
 
-        Surfaces are refined as often as at the frame itself.
+        Surfaces are refined as often as at the frame itself. Raises EmptyStage where nothing is left to draw.
         """
         assert scene.frame is not None
         for offset in cycle(scene.camera.shutter_times(count)):

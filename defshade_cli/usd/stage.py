@@ -28,7 +28,8 @@ _AS_AUTHORED = Composition()
 def open_stage(path: Path, composition: Composition = _AS_AUTHORED, camera: str | None = None) -> Usd.Stage:
     """Open a .usd, .usda, .usdc or .usdz file. What it refers to and is missing is logged.
 
-    camera: as the user names it, which a mask does not hide.  Raises as usd.composition.compose.
+    camera: as the user names it, which a mask does not hide.  Raises as usd.composition.compose:
+    StageNotFound, StageError, PrimNotFound.
     """
     with gathered_diagnostics() as told:
         stage = compose(path, composition, camera)

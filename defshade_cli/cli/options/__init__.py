@@ -34,7 +34,10 @@ __all__ = [
 
 
 def takes_stage(function: Function) -> Function:
-    """Give a command the options of stage and image: it is called with a RenderJob and its own keywords."""
+    """Give a command the options of stage and image: it is called with a RenderJob and its own keywords.
+
+    The command raises UsageError for options that do not go together.
+    """
     return _takes([_scene_argument(), *stage_options(), *image_options()], function)
 
 
@@ -43,6 +46,7 @@ def takes_job(*, layers: Sequence[str] = (), name: str = "{scene}") -> Callable[
 
     layers: written when the user names none; without them what the stage names.
     name: of the output, without frame and suffix, likewise; with layers of its own the command has a name of its own.
+    The command raises UsageError for options that do not go together.
     """
 
     def decorate(function: Function) -> Function:

@@ -34,14 +34,20 @@ def check_format(path: Path, output: OutputSettings) -> None:
 
 
 def is_in_bytes(path: Path, output: OutputSettings) -> bool:
-    """Are colours that `path` shows, as EXR does not, stored in 8 bits a channel just as they are?"""
+    """Are colours that `path` shows, as EXR does not, stored in 8 bits a channel just as they are?
+
+    Raises UsageError for a suffix of no known format.
+    """
     if suffix_of(path) == EXR:
         return True
     return bits_of(path, output) == 8 and not (output.dither or output.sheet)
 
 
 def encode(film: Film, names: tuple[str, ...], output: OutputSettings, path: Path) -> None:
-    """Write layers to `path`: all as EXR or a sheet, the only one as a picture. Raises OSError with the reason."""
+    """Write layers to `path`: all as EXR or a sheet, the only one as a picture.
+
+    Raises OSError with the reason, UsageError for a suffix, display or view that does not exist.
+    """
     if suffix_of(path) == EXR:
         write_exr(film, names, output, path)
     elif output.sheet:

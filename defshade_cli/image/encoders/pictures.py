@@ -61,7 +61,7 @@ PICTURES = {
 
 
 def write_picture(film: Film, name: str, output: OutputSettings, path: Path) -> None:
-    """Write the layer `name` as it looks. Raises OSError with the reason."""
+    """Write the layer `name` as it looks. Raises OSError with the reason, UsageError for no such display or view."""
     form, layer = _format(path), film.row(name)
     pixels = bounded(name, film.layers[name], half=layer.is_color)
     transform = display_transform(output.display, output.view, output.look, film.render_space)
@@ -76,7 +76,7 @@ def write_picture(film: Film, name: str, output: OutputSettings, path: Path) -> 
 
 
 def write_sheet(film: Film, names: tuple[str, ...], output: OutputSettings, path: Path) -> None:
-    """Write all the layers as tiles of one picture. Raises OSError with the reason."""
+    """Write all the layers as tiles of one picture. Raises as `write_picture`: OSError, UsageError."""
     transform = display_transform(output.display, output.view, output.look, film.render_space)
     sheet = contact_sheet({name: look_at_film(film, name, transform) for name in names})
     height, width = sheet.shape[:2]

@@ -31,7 +31,7 @@ def converged(job: RenderJob, frame: float | None, draw: Callable[[], Film]) -> 
     """The picture of `job`, drawn by `draw` where it is not kept yet.
 
     It is kept under the fingerprint of stage and settings, so that whatever changes pixels draws it anew.
-    Raises OutputError where it cannot be kept.
+    Raises OutputError where it cannot be kept, and what `draw` raises; UsageError as write.
     """
     made_of = Fingerprint(replace(job, output=_OUTPUT)).of(frame)
     path = cache_folder() / f"{job.stage.stem}.{made_of}.exr" if made_of else None
