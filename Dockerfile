@@ -1,5 +1,5 @@
 # Renders without a GPU: Mesa's llvmpipe. `make image`, then
-#   docker run --rm --volume "$PWD:/work" defshade render shot.usd -o shot.png
+#   docker run --rm --user "$(id -u)" --volume "$PWD:/work" defshade render shot.usd -o shot.png
 FROM debian:stable-slim AS build
 RUN apt-get update && apt-get install --yes --no-install-recommends make python3 python3-venv
 WORKDIR /src

@@ -20,7 +20,7 @@
 #   make farm-check  a batch of a thousand frames while workers die and the disk fills
 #   make gallery  render the documents' figures into docs/images
 #   make wheel   build dist/*.whl and dist/*.tar.gz
-#   make image   build the container image defshade, which renders without a GPU
+#   make image   build the container image defshade, which renders without a GPU, also with DOCKER=podman
 #   make clean   remove what was built, the virtual environment too
 
 SHELL := /bin/bash
@@ -32,6 +32,7 @@ SHELL := /bin/bash
 
 PYTHON ?= python3
 PEERS_PYTHON ?= .venv/bin/python
+DOCKER ?= docker
 BIN := .venv/bin
 PYTEST = $(BIN)/pytest -q --numprocesses logical --maxprocesses 8 --dist worksteal
 LIBRARIES := libEGL.so.1 libGL.so.1
@@ -113,12 +114,13 @@ tables: .venv/.ready
 gallery: .venv/.ready
 	$(BIN)/python -m defshade_cli.measure.gallery docs/images
 
-wheel: .venv/.ready-dev
+wheel: | .venv/bin/pip
+	$(BIN)/pip install --quiet build
 	$(BIN)/python -m build --outdir dist . >/dev/null
 	ls dist/*.whl dist/*.tar.gz
 
 image:
-	docker build --tag defshade .
+	$(DOCKER) build --tag defshade .
 
 clean:
 	rm -rf .venv out dist build .pytest_cache .ruff_cache .mypy_cache .hypothesis
