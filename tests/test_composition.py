@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
@@ -259,3 +260,35 @@ def test_a_job_file_says_the_same_as_options(stage: Path) -> None:
 def test_a_relative_session_layer_starts_from_the_folder_of_the_job(stage: Path) -> None:
     (step,) = yaml.safe_load(run(batch, "a.usda", "--session-layer", "over.usda", "--emit", "openjd"))["steps"]
     assert "{{Param.Folder}}/over.usda" in step["script"]["actions"]["onRun"]["args"]
+
+
+CLIPPED = """#usda 1.0
+def Cube "stays" {}
+def Cube "blinks" (
+    clips = {
+        dictionary default = {
+            asset[] assetPaths = [@./clip.usda@]
+            asset manifestAssetPath = @./manifest.usda@
+            string primPath = "/blinks"
+            double2[] active = [(0, 0)]
+            double2[] times = [(0, 0), (10, 10)]
+        }
+    }
+) {}
+"""
+CLIP = """#usda 1.0
+def Cube "blinks" {
+    double size.timeSamples = { 0: 1, 10: 3 }
+    token visibility.timeSamples = { 0: "inherited", 8: "invisible" }
+}
+"""
+
+
+def test_what_value_clips_alone_say_counts(tmp_path: Path) -> None:
+    """Neither attribute is authored on the stage, where USD lists what a prim has."""
+    (tmp_path / "clip.usda").write_text(CLIP)
+    (tmp_path / "manifest.usda").write_text('#usda 1.0\nover "blinks" {\n double size\n token visibility\n}\n')
+    (tmp_path / "shot.usda").write_text(CLIPPED)
+    reader = StageReader(open_stage(tmp_path / "shot.usda"))
+    sizes = [np.ptp(reader.read(frame).meshes[1].points) for frame in (0.0, 5.0)]
+    assert sizes == [1.0, 2.0] and names(reader.read(9.0)) == {"/stays"}

@@ -21,6 +21,7 @@ from defshade_cli.usd.said import Said
 from defshade_cli.usd.shapes import Shapes
 from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.skel import Rigs
+from defshade_cli.usd.stage import has_clips
 from defshade_cli.usd.subsets import material_subsets
 
 
@@ -29,7 +30,7 @@ class Memory:
 
     seen_from: for cards placed by their textures.
     as_cages: what is round is what Hydra draws of it: see gprims.read_solid, and facing.
-    kinds: of prims.  rigs: what skeletons deform.
+    kinds: of prims.  rigs: what skeletons deform.  clipped: see stage.has_clips.
     xforms: USD's cache, which drops only what varies when its time is set.
     """
 
@@ -42,6 +43,7 @@ class Memory:
         seen_from: SeenFrom | None = None,
     ) -> None:
         self.kinds = Kinds()
+        self.clipped = has_clips(stage)
         self.rigs = Rigs()
         self.xforms = UsdGeom.XformCache()
         self._stage, self._extras, self._as_cages = stage, extras, as_cages

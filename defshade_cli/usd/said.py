@@ -20,8 +20,8 @@ class Said(NamedTuple):
     primvars: bool
 
 
-def said_of(prim: Usd.Prim, *, primvars_above: bool = True) -> Said:
-    """primvars_above: may an ancestor have some?"""
-    names = prim.GetAuthoredPropertyNames()
+def said_of(prim: Usd.Prim, *, primvars_above: bool = True, clipped: bool = False) -> Said:
+    """primvars_above: may an ancestor have some?  clipped: value clips may say more than is authored, see has_clips."""
+    names = prim.GetPropertyNames() if clipped else prim.GetAuthoredPropertyNames()
     primvars = primvars_above or "\nprimvars:" in "\n" + "\n".join(names)
     return Said(str(prim.GetPath()), prim.GetTypeName(), names, primvars)

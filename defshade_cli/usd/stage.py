@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -83,6 +84,12 @@ def may_change(stage: Usd.Stage) -> bool:
         return True
     ranged = stage.HasAuthoredTimeCodeRange() and stage.GetStartTimeCode() < stage.GetEndTimeCode()
     return ranged and any(a.HasSpline() for prim in stage.TraverseAll() for a in prim.GetAuthoredAttributes())
+
+
+def has_clips(stage: Usd.Stage) -> bool:
+    """Do values come from value clips anywhere? What these alone say, is no authored property to USD."""
+    prims = chain(stage.TraverseAll(), *(Usd.PrimRange.AllPrims(prototype) for prototype in stage.GetPrototypes()))
+    return any(prim.HasAuthoredMetadata("clips") for prim in prims)
 
 
 def stage_name(stage: Usd.Stage) -> str:

@@ -97,7 +97,7 @@ class Traversal:
         kind = nature.kind
         if kind is Kind.SHADING or self._is_pruned(prim):
             return (), above
-        said = said_of(prim, primvars_above=above.primvars)
+        said = said_of(prim, primvars_above=above.primvars, clipped=self._memory.clipped)
         here = self._stand(prim, above, nature, said)
         if here is None:
             return (), above
