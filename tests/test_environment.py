@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from defshade_cli.passes.sampling import owen_sobol
 from defshade_cli.scene.distribution import GridDistribution
@@ -26,24 +27,34 @@ def drawn(sky: Environment, count: int = 64) -> tuple[np.ndarray, np.ndarray]:
 def test_the_mean_of_samples_is_the_integral(sky: Environment) -> None:
     """∫ L dω = 4π for both, and ∫ L y dω = 4π/3 for the gradient."""
     directions, weights = drawn(sky)
-    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0, rtol=1e-12)
-    np.testing.assert_allclose(weights.mean(0), 4 * math.pi, rtol=2e-3)
+    assert_allclose(np.linalg.norm(directions, axis=1), 1.0, rtol=1e-12)
+    assert_allclose(weights.mean(0), 4 * math.pi, rtol=2e-3)
     expected = 0.0 if np.ptp(sky.radiance) == 0.0 else 4 * math.pi / 3
-    np.testing.assert_allclose((weights * directions[:, 1:2]).mean(0), expected, rtol=1e-2, atol=0.05)
+    assert_allclose((weights * directions[:, 1:2]).mean(0), expected, rtol=1e-2, atol=0.05)
 
 
 def test_directions_by_any_density_have_the_same_mean() -> None:
     sky = Environment(np.random.default_rng(1).random((8, 16, 3)))
-    density = GridDistribution(np.random.default_rng(2).random((8, 16)) + 0.1)
+    density = GridDistribution((np.random.default_rng(2).random((8, 16)) + 0.1).repeat(2, 0).repeat(2, 1))
     drawn = [[sky.sample(owen_sobol(i, 3), by)[1] for i in range(4096)] for by in (None, density)]
-    np.testing.assert_allclose(np.mean(drawn[0], axis=0), np.mean(drawn[1], axis=0), rtol=5e-3)
+    assert_allclose(np.mean(drawn[0], axis=0), np.mean(drawn[1], axis=0), rtol=5e-3)
 
 
 def test_cells_hold_the_directions_that_are_drawn_from_them() -> None:
-    sky = Environment(np.eye(3)[np.arange(8 * 16).reshape(8, 16) % 3])
+    sky = Environment(np.random.default_rng(3).random((8, 16, 1)).repeat(3, axis=2))
     directions, radiance, extents = zip(*(sky.sample(owen_sobol(i, 5)) for i in range(64)), strict=True)
     cells = sky.cell_of(np.array(directions))
-    np.testing.assert_allclose(sky.radiance[cells], np.array(radiance) / np.array(extents)[:, None], rtol=1e-6)
+    assert_allclose(sky.luminance[cells], np.array(radiance)[:, 0] / extents, rtol=1e-6)
+    assert_allclose(sky.density()[cells], 1.0 / np.array(extents), rtol=1e-6)
+
+
+def test_cells_are_of_the_sky_as_it_is_interpolated() -> None:
+    """A bright pixel is a tent over its neighbours, in halves of pixels; from column to column around the sky."""
+    radiance = np.zeros((8, 16, 3), np.float32)
+    radiance[4, 0] = 16.0
+    tent = np.array([1.0, 3.0, 3.0, 1.0])
+    around = Environment(radiance).luminance[7:11][:, [-1, 0, 1, 2]]
+    assert_allclose(around, np.outer(tent, tent), rtol=1e-6)
 
 
 def test_a_sun_is_found_where_it_stands() -> None:
@@ -65,11 +76,11 @@ def test_irradiance_of_a_gradient_is_exact() -> None:
     normals = np.array([[0, 1, 0], [0, -1, 0], [1, 0, 0], [0.6, 0.8, 0]], np.float64)
     irradiance = harmonics(normals) @ gradient_sky().irradiance_sh
     expected = math.pi * (1 + 2 / 3 * normals[:, 1])
-    np.testing.assert_allclose(irradiance, np.repeat(expected[:, None], 3, axis=1), rtol=2e-3)
+    assert_allclose(irradiance, np.repeat(expected[:, None], 3, axis=1), rtol=2e-3)
 
 
 def test_harmonics_are_orthonormal() -> None:
     rng = np.random.default_rng(1)
     d = rng.normal(size=(200_000, 3))
     y = harmonics(d / np.linalg.norm(d, axis=1, keepdims=True))
-    np.testing.assert_allclose(4 * math.pi * (y.T @ y) / len(d), np.eye(9), atol=0.02)  # 1/√200000 of noise, times 4π
+    assert_allclose(4 * math.pi * (y.T @ y) / len(d), np.eye(9), atol=0.02)  # 1/√200000 of noise, times 4π

@@ -26,9 +26,9 @@ def pipeline(gpu: Gpu) -> Pipeline:
     return Pipeline(gpu)
 
 
-def directions(pipeline: Pipeline, of: Scene) -> np.ndarray:
+def directions(pipeline: Pipeline, of: Scene, rays: int = 0) -> np.ndarray:
     """(1024, 3) world space."""
-    plan = scout(make_plan(of, RenderSettings(size=(64, 64), samples=4)))
+    plan = replace(scout(make_plan(of, RenderSettings(size=(64, 64), samples=4))), sky_rays=rays)
     density = sky_guides(pipeline.planes(of, plan), plan)[SKY]
     drawn = [uniform_environment().sample(owen_sobol(i, 1), density)[0] for i in range(1024)]
     return np.array(drawn) @ SKY.world_from_light[:3, :3].T
@@ -50,3 +50,9 @@ def test_nothing_is_looked_for_where_nothing_is_lit(pipeline: Pipeline) -> None:
     of = scene([quad(5.0)], [SKY], [MIRROR], camera(5.0, 0.1))
     film = pipeline.render(of, make_plan(of, RenderSettings(size=(8, 8), samples=2, layers=("alpha",))))
     assert (film.layers["alpha"] == 1.0).all()
+
+
+def test_lobes_that_have_rays_draw_no_directions(pipeline: Pipeline) -> None:
+    of = scene([quad(5.0)], [SKY], [MIRROR], camera(5.0, 0.1))
+    backwards = directions(pipeline, of, rays=1)[:, 2] > np.cos(np.radians(25.0))
+    assert backwards.mean() == pytest.approx(0.5 * (1.0 - np.cos(np.radians(25.0))), abs=0.02)

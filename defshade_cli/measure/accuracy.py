@@ -29,7 +29,7 @@ SIZE = (320, 180)
 SAMPLES = (1, 16, 256)
 
 REFERENCE_SAMPLES = 2048
-_OF_NOISY_STAGES = {"dome_even": 16384, "dome_gloss": 16384, "materials": 4096}
+_OF_NOISY_STAGES = {"dome_even": 16384, "dome_gloss": 8192, "dome_sun": 4096, "materials": 4096}
 STAGES = Path("accuracy")
 CACHE = Path("out/accuracy")
 _CHARTS = ("materials",)

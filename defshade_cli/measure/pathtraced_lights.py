@@ -22,7 +22,7 @@ from defshade_cli.spaces import Matrix, normalize, rigid, transform_points
 _FAR = 1e4  # distance of a distant light's disk over the scene's radius
 _HAIR = 1e-4  # between a mesh light and the surface that it is, over the scene's radius
 _TURNED = np.diag([1.0, -1.0, -1.0, 1.0])  # Mitsuba's flat shapes face +Z, USD's lights −Z
-_FINER = 4  # Mitsuba interpolates a sky's pixels, which finer ones leave as flat as they are here
+_FINER = 4  # than a sky's own are the pixels that Mitsuba interpolates: its rows reach from pole to pole
 
 
 def emitter(light: Light, centre: NDArray[np.float64], radius: float) -> Any:
@@ -57,10 +57,20 @@ def _distant(light: DistantLight, centre: NDArray[np.float64], radius: float) ->
 
 
 def _sky(light: DomeLight) -> dict[str, Any]:
-    radiance = sky_of(light).radiance * light.emission
-    texels = radiance.repeat(_FINER, 0).repeat(_FINER, 1).astype(np.float32)
+    texels = (_refined(sky_of(light).radiance) * light.emission).astype(np.float32)
     frame = transform(rigid(light.world_from_light))
     return {"type": "envmap", "bitmap": mi.Bitmap(texels), "to_world": frame, "scale": 1.0}
+
+
+def _refined(sky: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Between its pixels' centres, at Mitsuba's rows and columns."""
+    height, width = sky.shape[:2]
+    rows = np.clip(np.linspace(0.0, height, _FINER * height) - 0.5, 0.0, height - 1.0)
+    columns = (np.arange(_FINER * width) + 0.5) / _FINER - 0.5
+    top, left = np.floor(rows).astype(int), np.floor(columns).astype(int)
+    down, right = (rows - top)[:, None, None], (columns - left)[:, None]
+    across = sky[:, left % width] * (1.0 - right) + sky[:, (left + 1) % width] * right
+    return across[top] * (1.0 - down) + across[np.minimum(top + 1, height - 1)] * down
 
 
 def _glowing_mesh(light: MeshLight, radius: float) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -33,6 +33,8 @@ from defshade_cli.passes.screen import WHOLE, Screen, TileMask
 from defshade_cli.passes.shadow_atlas import ShadowAtlas
 from defshade_cli.passes.shadows import ShadowPass, ShadowVariant
 from defshade_cli.passes.sky_guide import NO_GUIDES, SkyGuides, scout, sky_guides
+from defshade_cli.passes.sky_rays import SkyRays, SkyRaysPass, TreeStore, sky_densities
+from defshade_cli.passes.sky_textures import SkyTextures
 from defshade_cli.passes.sky_visibility import SkyVisibility, SkyVisibilityPass
 from defshade_cli.passes.stopping import Stopping
 from defshade_cli.passes.tables import LightTables, TableStore
@@ -52,6 +54,7 @@ class _Canvas:
     targets: LightTargets
     visibility: SkyVisibility | None
     guides: SkyGuides
+    rays: SkyRays | None
 
 
 class Pipeline:
@@ -66,10 +69,14 @@ class Pipeline:
         self._lights = RecordBuffer(gpu, LIGHTS)
         self._motions = RecordBuffer(gpu, MOTIONS)
         self._screen, self._mask = Screen(gpu), TileMask(gpu)
+        self._skies, self._trees = SkyTextures(gpu), TreeStore(gpu)
         self._gbuffer_pass = cache(lambda variant: GBufferPass(gpu, variant))
         self._emission_pass = cache(lambda variant: EmissionPass(gpu, variant, self._screen))
         self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant, self._screen))
-        self._environment_pass = cache(lambda variant: EnvironmentPass(gpu, variant, self._screen))
+        self._environment_pass = cache(lambda variant: EnvironmentPass(gpu, variant, self._screen, self._skies))
+        self._sky_rays_pass = cache(
+            lambda variant, hidden: SkyRaysPass(gpu, variant, self._screen, self._skies, hidden=hidden)
+        )
         self._sky_visibility_pass = cache(lambda variant: SkyVisibilityPass(gpu, variant, self._screen))
         self._shadow_pass = cache(lambda variant: ShadowPass(gpu, variant))
         self._light_tiles = LightTiles(gpu, self._frame)
@@ -157,7 +164,7 @@ class Pipeline:
         targets.clear()
         hidden = any(plan.hides_sky(dome) for dome in plan.domes)
         visibility = SkyVisibility.of(self._frame, plan.size) if hidden else None
-        canvas = _Canvas(gbuffer, targets, visibility, guides)
+        canvas = _Canvas(gbuffer, targets, visibility, guides, self._sky_rays(scene, plan, guides))
         tables = self._tables.update(plan)
         self._accumulation.begin(plan.size, plan.samples)
         self._stopping.begin(plan)
@@ -167,6 +174,8 @@ class Pipeline:
                 draws = self._scene.update(scene, plan.inputs, texels=plan.texels, thin=plan.thin)
                 tables = self._tables.update(plan)
                 mattes.see(scene)
+                if canvas.rays and canvas.rays.tree:
+                    canvas = replace(canvas, rays=replace(canvas.rays, tree=self._trees.update(scene)))
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             if plan.mattes:
                 mattes.add(gbuffer.target.read("visible"))
@@ -175,6 +184,8 @@ class Pipeline:
             if self._stopping.is_over(self._accumulation):
                 break
         sampling, counts, variance = self._stopping.finish(self._accumulation.count)
+        if canvas.rays:
+            canvas.rays.release()
         beauty = self._accumulation.mean(counts)
         if plan.debug == "volumes":
             beauty = laid_over(beauty, self._volumes(draws, plan, tables, gbuffer))
@@ -216,6 +227,16 @@ class Pipeline:
             environment = self._environment_pass(EnvironmentVariant.of(plan, dome))
             first_link = tables.links.lights.get(dome.light, ALL_LINKED)
             environment.draw(dome, gbuffer, targets, visibility, first_link)
+            if canvas.rays:
+                lobes = self._sky_rays_pass(LightingVariant.of(plan), plan.shadows_sky(dome))
+                lobes.draw(dome, plan, gbuffer, targets, canvas.rays, first_link)
+
+    def _sky_rays(self, scene: Scene, plan: Plan, guides: SkyGuides) -> SkyRays | None:
+        """What rays into domes' skies need, if any are sent."""
+        if not plan.sky_rays:
+            return None
+        hidden = any(plan.shadows_sky(dome) for dome in plan.domes)
+        return SkyRays(sky_densities(plan, guides, self._skies), self._trees.update(scene) if hidden else None)
 
     def _guides(self, draws: DrawList, plan: Plan) -> SkyGuides:
         """Where in its domes' skies the image looks for light, if samples are drawn there."""

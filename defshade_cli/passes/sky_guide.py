@@ -1,15 +1,15 @@
 """Where in a sky the image looks for light.
 
 All pixels share the directions of a sample, so they are drawn where pixels need them: half of them by the sky's
-luminance alone, and half by what some thousand pixels see of it, in their lobes and by their diffuse, shadows apart.
-A smooth metal's pixels look into few directions, where luminance alone would send hardly any. Whatever the density, the
-mean is the same.
+luminance alone, and half by what some thousand pixels see of it by their diffuse, and in lobes that have no rays of
+their own (passes/sky_rays.py), shadows apart. A smooth metal's pixels look into few directions, where luminance alone
+would send hardly any. Whatever the density, the mean is the same.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,8 +32,8 @@ _ACROSS = 96
 """Pixels of the image in which the directions are looked for."""
 _DIRECTIONS = 8
 """Of each lobe of a pixel."""
-_PARTS = 0.5, 0.35, 0.15
-"""Of the directions, that are drawn by luminance, by lobes and by the diffuse."""
+_PARTS, _PARTS_BESIDE_RAYS = (0.5, 0.35, 0.15), (0.5, 0.0, 0.5)
+"""Of the directions, that are drawn by luminance, by lobes and by the diffuse; and where rays serve the lobes."""
 _IS_MIRROR = np.arange(2 * _DIRECTIONS) < _DIRECTIONS
 _DIELECTRIC_F0 = 0.04
 
@@ -50,10 +50,11 @@ def sky_guides(planes: Planes, plan: Plan) -> SkyGuides:
     if not len(shares):
         return NO_GUIDES
     domes = [planned.light for planned in plan.domes if isinstance(planned.light, DomeLight)]
-    return {dome: _guide(dome, directions, shares) for dome in domes}
+    parts = _PARTS_BESIDE_RAYS if plan.sky_rays else _PARTS
+    return {dome: _guide(dome, directions, shares, parts) for dome in domes}
 
 
-def _guide(dome: DomeLight, directions: Array, shares: Array) -> GridDistribution:
+def _guide(dome: DomeLight, directions: Array, shares: Array, parts: Sequence[float]) -> GridDistribution:
     sky = sky_of(dome)
     local = transform_directions(rigid(dome.world_from_light).T, directions.reshape(-1, 3))
     cells = sky.cell_of(local)
@@ -61,8 +62,8 @@ def _guide(dome: DomeLight, directions: Array, shares: Array) -> GridDistributio
     total = seen.sum(axis=1, keepdims=True)
     seen /= total + 0.1 * total.mean() + 1e-300
     mirrored, scattered = (_counted(cells, seen * lobe, sky) for lobe in (_IS_MIRROR, ~_IS_MIRROR))
-    parts = zip(_PARTS, (sky.power, mirrored, scattered), strict=True)
-    return GridDistribution(sum(part * weights / max(weights.sum(), 1e-300) for part, weights in parts))
+    weighed = zip(parts, (sky.power, mirrored, scattered), strict=True)
+    return GridDistribution(sum(part * weights / max(weights.sum(), 1e-300) for part, weights in weighed))
 
 
 def _counted(cells: tuple[NDArray[np.intp], NDArray[np.intp]], seen: Array, sky: Environment) -> Array:

@@ -34,6 +34,7 @@ def view_record(plan: Plan, layout: Layout, sample: Sample = CENTRE) -> NDArray[
     view["exposure"] = plan.exposure
     view["sample_index"] = sample.index
     view["sky_share"] = plan.sky_share
+    view["sky_rays"] = plan.sky_rays * plan.samples
     view["pixel_share"] = 1.0 / plan.samples if plan.samples > 1 else 0.0
     return view
 

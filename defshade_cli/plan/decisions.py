@@ -43,6 +43,8 @@ def explain(plan: Plan) -> Iterator[Decision]:
     yield _kept("IES profiles", bool(plan.profiles), "a light is shaped by one", "no light has one")
     yield _kept("shadow linking", plan.shadow_linked, "a light chooses its casters", "everything casts shadows")
     yield _kept("environment", bool(plan.domes), "a dome lights the scene", "no dome")
+    few = "no dome has directions, or its rays would have to know opacity, links or too many triangles"
+    yield _kept("rays into domes", plan.sky_rays > 0, f"{plan.sky_rays} a sample along sharp lobes", few)
     if plan.portals:
         yield Decision("portals", "passed over", "hints: domes are sampled by their radiance")
     yield _kept("cutout", plan.cutout, "some opacity is or may be below 1", "no opacity is below 1")

@@ -21,6 +21,7 @@ from defshade_cli.plan.lights import PlannedLight, plan_lights
 from defshade_cli.plan.moments import count_moments, share_moments
 from defshade_cli.plan.opacity import is_transparent, thin_materials, thin_numbers
 from defshade_cli.plan.shadow_maps import count_maps, shadow_resolution
+from defshade_cli.plan.sky_rays import count_sky_rays
 from defshade_cli.plan.texels import seen_texels
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.ies import IesProfile
@@ -52,6 +53,7 @@ class Plan:
     planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
     lights: sorted quads, spheres, cones.  lighting: how they are drawn, volumes or tiles.
     shadows: some light casts them.  shadow_linked: in some light not all geometry does.
+    sky_rays: of a pixel in a sample along its lobes, see plan/sky_rays.py.
     background: domes are seen where no geometry is.
     thin: numbers of the materials whose opacity may be below 1.  transparent: it scales the diffuse of some alone.
     texels: of each texture that is read, a side that it is worth, see plan/texels.py.
@@ -84,6 +86,7 @@ class Plan:
     lighting: Lighting
     shadows: bool
     shadow_linked: bool
+    sky_rays: int
     background: bool
     thin: tuple[int, ...]
     transparent: bool
@@ -120,7 +123,7 @@ class Plan:
     @property
     def lit(self) -> bool:
         """Does any layer need the lighting?"""
-        return any(LAYERS[name].source == "lighting" for name in self.layers)
+        return _has_light(self.layers)
 
     @property
     def tracks_error(self) -> bool:
@@ -186,7 +189,11 @@ class Plan:
         return 4.0 / directions if directions else 0.0
 
     def hides_sky(self, planned: PlannedLight) -> bool:
-        """Is it a dome that geometry hides, as far as the directions drawn so far tell?"""
+        """Is it a dome that geometry hides, as far as the directions drawn so far tell? Rays need not ask them."""
+        return self.shadows_sky(planned) and not self.sky_rays
+
+    def shadows_sky(self, planned: PlannedLight) -> bool:
+        """Is it a dome with directions that geometry hides?"""
         casts = self.shadows and planned.light.casts_shadow
         return isinstance(planned.light, DomeLight) and planned.points > 0 and casts
 
@@ -257,6 +264,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         lighting=choose_lighting(lights, camera, settings, layers),
         shadows=shadows,
         shadow_linked=shadows and scene.shadow_linked,
+        sky_rays=count_sky_rays(lights, scene, settings, thin=bool(thin)) if _has_light(layers) else 0,
         background=settings.background,
         thin=thin_numbers(scene, thin),
         transparent=is_transparent(thin, settings.shading),
@@ -284,9 +292,13 @@ def plan_moments(plan: Plan, seen: Iterator[Scene], settings: RenderSettings) ->
         yield moment, replace(planned, planes=plan.planes, transparent=plan.transparent, texels=plan.texels)
 
 
+def _has_light(layers: tuple[str, ...]) -> bool:
+    return any(LAYERS[name].source == "lighting" for name in layers)
+
+
 def _seen_lights(lights: tuple[PlannedLight, ...], layers: tuple[str, ...]) -> tuple[PlannedLight, ...]:
     """All lights for a lit layer; for mere coverage the domes, which cover what is behind the geometry."""
-    if any(LAYERS[name].source == "lighting" for name in layers):
+    if _has_light(layers):
         return lights
     return tuple(planned for planned in lights if isinstance(planned.light, DomeLight))
 

@@ -20,6 +20,9 @@ _SMALL, _MIDDLING = 0.03, 0.12
 """Radius over distance: up to the first one point does, up to the second a quarter of the largest lights' number."""
 
 
+_RAYS_FOR_EACH_POINT = 0.25
+"""Of a large light, in all samples together; at least."""
+
 _SKY_DIRECTIONS, _FOR_EACH_POINT = 4, 8
 """Of a dome: in a sample, and in all samples together for each point of a large light; at least."""
 
@@ -31,6 +34,11 @@ def points_of(light: Light, shared: int, settings: RenderSettings) -> int:
     if settings.most_samples * settings.light_points == 1:
         return 0
     return max(_power_of_two(_FOR_EACH_POINT * settings.light_points / settings.most_samples), _SKY_DIRECTIONS)
+
+
+def rays_a_sample(settings: RenderSettings) -> int:
+    """Of a pixel into a sky, where it has any."""
+    return _power_of_two(settings.light_points * _RAYS_FOR_EACH_POINT / settings.most_samples)
 
 
 def apparent_size(light: Light, bounds: NDArray[np.float64]) -> float:

@@ -25,6 +25,12 @@ class GridDistribution:
         self._rows = cumulative(weights.sum(axis=1))
         self._columns = cumulative(weights)
 
+    @property
+    def chances(self) -> NDArray[np.float64]:
+        """(H, W) of each cell."""
+        rows, columns = (np.diff(steps, axis=-1, prepend=0.0) for steps in (self._rows, self._columns))
+        return rows[:, None] * columns
+
     def draw(self, u: tuple[float, float]) -> Draw:
         """What a point of the unit square falls on: rows by its first coordinate, columns by its second."""
         row, down = step_at(self._rows, u[0])

@@ -54,6 +54,17 @@ class Environment:
         extent = float(self._solid_angles[row, column]) / chance if chance > 0 else 0.0
         return direction, self._cells[row, column] * extent, extent
 
+    def density(self, distribution: GridDistribution | None = None) -> NDArray[np.float32]:
+        """(H, W) by solid angle, of the directions that `sample` draws; as fine as the map or finer."""
+        rows, columns = (np.diff(edges) for edges in self._edges)
+        cells = (distribution or self._distribution).chances / self._solid_angles
+        return cells.repeat(rows, axis=0).repeat(columns, axis=1).astype(np.float32)
+
+    @property
+    def cell_level(self) -> float:
+        """How often the map is to be halved for pixels as large as the cells that directions are drawn from."""
+        return max(math.log2(n / most) for n, most in zip((*self.radiance.shape[:2], 1), (*_CELLS, 1), strict=True))
+
     @cached_property
     def irradiance_sh(self) -> NDArray[np.float64]:
         """(9, 3) coefficients in real spherical harmonics of the irradiance on a surface by its normal.
@@ -69,9 +80,18 @@ class Environment:
         return _COSINE_LOBE[:, None] * np.einsum("hwk,hw,hwc->kc", basis, self._solid_angles, self._cells)
 
     @cached_property
+    def _fine(self) -> NDArray[np.float32]:
+        """The map as it is interpolated between its pixels, which matters where they are hardly finer than cells."""
+        if self.radiance.shape[0] > 2 * _CELLS[0]:
+            return self.radiance
+        rows = _doubled(np.pad(self.radiance, ((1, 1), (0, 0), (0, 0)), mode="edge"))
+        columns = np.pad(rows, ((0, 0), (1, 1), (0, 0)), mode="wrap").swapaxes(0, 1)
+        return _doubled(columns).swapaxes(0, 1)
+
+    @cached_property
     def _edges(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Pixel rows and columns at which cells begin, and the end."""
-        shape = self.radiance.shape[:2]
+        """Rows and columns of the fine map at which cells begin, and the end."""
+        shape = self._fine.shape[:2]
         edges = [np.linspace(0, n, min(n, most) + 1).astype(int) for n, most in zip(shape, _CELLS, strict=True)]
         return edges[0], edges[1]
 
@@ -79,20 +99,20 @@ class Environment:
     def _cells(self) -> NDArray[np.float64]:
         """(h, w, 3) the map averaged over whole cells; its rows count by their solid angle."""
         rows, columns = self._edges
-        height = self.radiance.shape[0]
+        height = len(self._fine)
         weight = np.sin(math.pi * (np.arange(height) + 0.5) / height)[:, None, None]
-        summed = np.add.reduceat(self.radiance * weight, rows[:-1], axis=0) / np.add.reduceat(weight, rows[:-1], axis=0)
+        summed = np.add.reduceat(self._fine * weight, rows[:-1], axis=0) / np.add.reduceat(weight, rows[:-1], axis=0)
         return np.add.reduceat(summed, columns[:-1], axis=1) / np.diff(columns)[:, None]
 
     @cached_property
     def _sines(self) -> NDArray[np.float64]:
         """(h + 1,) sine of the latitude at the rows' edges, from the top."""
-        return np.cos(math.pi * self._edges[0] / self.radiance.shape[0])
+        return np.cos(math.pi * self._edges[0] / self._fine.shape[0])
 
     @cached_property
     def _longitudes(self) -> NDArray[np.float64]:
         """(w + 1,) at the columns' edges, from the left: +π to −π."""
-        return 2.0 * math.pi * (0.5 - self._edges[1] / self.radiance.shape[1])
+        return 2.0 * math.pi * (0.5 - self._edges[1] / self._fine.shape[1])
 
     @cached_property
     def _solid_angles(self) -> NDArray[np.float64]:
@@ -119,6 +139,12 @@ class Environment:
         columns = np.searchsorted(-self._longitudes, -np.arctan2(directions[:, 0], directions[:, 2])) - 1
         height, width = self.luminance.shape
         return np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
+
+
+def _doubled(padded: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(2N, …) means of the halves of pixels that are interpolated linearly, of N pixels and one beside either end."""
+    middle = 0.75 * padded[1:-1]
+    return np.stack([middle + 0.25 * padded[:-2], middle + 0.25 * padded[2:]], axis=1).reshape(-1, *padded.shape[1:])
 
 
 def uniform_environment() -> Environment:

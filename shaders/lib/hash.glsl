@@ -28,3 +28,17 @@ float owen_van_der_corput(uint index, uvec4 seed) {
     uint shuffled = bitfieldReverse(laine_karras(bitfieldReverse(index), keys.x));
     return float(bitfieldReverse(laine_karras(shuffled, keys.y)) >> 8u) * (1.0 / 16777216.0);
 }
+
+uint owen_scrambled(uint bits, uint key) {
+    return bitfieldReverse(laine_karras(bitfieldReverse(bits), key));
+}
+
+// Point `index` of the seed's own Owen-scrambled (0, 2)-sequence, as passes/sampling.py has it.
+vec2 owen_sobol(uint index, uvec4 seed) {
+    uvec4 keys = pcg4d(seed);
+    uint shuffled = owen_scrambled(index, keys.x), second = 0u;
+    for (uint bits = shuffled, column = 1u << 31u; bits != 0u; bits >>= 1u, column ^= column >> 1u)
+        if ((bits & 1u) != 0u) second ^= column;
+    uvec2 point = uvec2(owen_scrambled(bitfieldReverse(shuffled), keys.y), owen_scrambled(second, keys.z));
+    return vec2(point >> 8u) * (1.0 / 16777216.0);
+}

@@ -11,6 +11,7 @@ struct View {
     uint sample_index;
     float pixel_share;         // of a pixel, that a sample stands for; 0 in a frame of one sample
     float sky_share;           // of a dome, that four of its directions stand for
+    float sky_rays;            // of a pixel, in all samples together
 };
 
 struct Instance {

@@ -5,6 +5,9 @@
 #ifdef PLANE_LINKS
 #include "lib/linking.glsl"
 #endif
+#ifdef SKY_RAYS
+#include "lib/lobe_rays.glsl"
+#endif
 #include "lib/render_space.glsl"
 #include "lib/lit.glsl"
 #include "generated/planes.glsl"
@@ -47,7 +50,7 @@ vec3 lobe_response(Light light, Surface s) {
 #ifdef PLANE_WEIGHTS
     response *= s.weights.xyy;
 #endif
-#ifdef SKY
+#if defined(SKY) && !defined(SKY_RAYS)
     if (light.is_sky == 0u) return response;
 #ifdef PLANE_CLEARCOAT
     response.z *= 1.0 - sharpness(s.clearcoat_roughness, view.sky_share);
@@ -79,11 +82,17 @@ Lit lit_by(Light light, vec3 l, vec3 irradiance, Surface surface, vec3 position,
 #endif
     vec3 response = lobe_response(light, surface);
 #ifdef PATCHES
+#ifdef SKY_RAYS
+    if (light.is_sky == 0u)
+#endif
     widening += patch_alpha_squared(light, position, l);
     if (widening > 0.0) {
         surface.roughness = widened_roughness(surface.roughness, widening);
         surface.clearcoat_roughness = widened_roughness(surface.clearcoat_roughness, widening);
     }
+#endif
+#ifdef SKY_RAYS
+    if (light.is_sky != 0u) response.yz *= share_beside_rays(surface, v, l, light.extent);
 #endif
     vec3 arriving = render_from_rec709(irradiance);
     lit.radiance = arriving * evaluate_brdf(surface, v, l, response);

@@ -1,0 +1,47 @@
+// Rays along a surface's lobes, and how dense they are.
+
+// Of the coat's lobe among rays, by what both lobes reflect.
+float coat_rays(Surface s, float NoV) {
+#ifdef PLANE_CLEARCOAT
+    vec3 base = E_bound(s.f0, s.f90, NoV, GGX_alpha(s.roughness), SMITH_GGX);
+    float coat = s.clearcoat * E_bound(vec3(DEFAULT_F0), vec3(1.0), NoV, GGX_alpha(s.clearcoat_roughness), SMITH_GGX).x;
+    return coat / max(coat + (base.x + base.y + base.z) / 3.0, 1e-6);
+#else
+    return 0.0;
+#endif
+}
+
+// Of a pixel's samples, the share that sends rays: lobes as wide as these find the sky by the directions that pixels share.
+float ray_share(Surface s, vec3 v) {
+    if (dot(s.normal, v) < MIN_NOV) return 0.0;
+    float sharpest = s.roughness;
+#ifdef PLANE_CLEARCOAT
+    if (s.clearcoat > 0.0) sharpest = min(sharpest, s.clearcoat_roughness);
+#endif
+    return 1.0 - smoothstep(0.5, 0.7, sharpest);
+}
+
+// Heitz 2018, "Sampling the GGX Distribution of Visible Normals", eq. 17: G1 D / (4 NoV) by solid angle of the light.
+float visible_normals_density(float alpha, float NoV, float NoH, vec3 n, vec3 h) {
+    float a2 = alpha * alpha;
+    return 0.5 * D_GGX(alpha, NoH, n, h) / (NoV + sqrt(a2 + (1.0 - a2) * NoV * NoV));
+}
+
+// Of rays along `l`, by solid angle.
+float ray_density(Surface s, vec3 v, vec3 l) {
+    vec3 h = normalize(v + l);
+    float NoV = dot(s.normal, v), NoH = dot(s.normal, h);
+    float density = visible_normals_density(GGX_alpha(s.roughness), NoV, NoH, s.normal, h);
+#ifdef PLANE_CLEARCOAT
+    float coat = visible_normals_density(GGX_alpha(s.clearcoat_roughness), NoV, NoH, s.normal, h);
+    density = mix(density, coat, coat_rays(s, NoV));
+#endif
+    return density;
+}
+
+// What directions that all pixels share, each standing for an `extent` of the sky, bear of the lobes' light: the rest is the
+// rays'. Veach & Guibas 1995, "Optimally Combining Sampling Techniques for Monte Carlo Rendering", the balance heuristic.
+float share_beside_rays(Surface s, vec3 v, vec3 l, float extent) {
+    float share = ray_share(s, v);
+    return share > 0.0 ? 1.0 / (1.0 + extent * view.sky_rays * share * ray_density(s, v, l)) : 1.0;
+}

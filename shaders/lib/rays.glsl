@@ -1,0 +1,45 @@
+// Does a ray meet a triangle? By boxes in a complete binary tree (scene/triangle_tree.py): node i has the children 2i and 2i + 1,
+// so the next node of a walk is its own number plus one, less its trailing zeros.
+layout(std430, binding = 9) readonly buffer BoxBlock { vec4 tree_boxes[]; };
+layout(std430, binding = 10) readonly buffer TriangleBlock { vec4 tree_triangles[]; };
+
+uniform uvec2 tree_shape;          // leaves, and triangles of each
+uniform vec3 tree_from_relative;   // what takes a relative position to where triangles are counted from
+
+// Möller & Trumbore 1997, "Fast, Minimum Storage Ray/Triangle Intersection".
+bool meets_triangle(vec3 origin, vec3 direction, uint triangle) {
+    vec3 along = tree_triangles[3u * triangle + 1u].xyz, aside = tree_triangles[3u * triangle + 2u].xyz;
+    vec3 p = cross(direction, aside);
+    float scale = 1.0 / dot(along, p);
+    vec3 s = origin - tree_triangles[3u * triangle].xyz;
+    vec3 q = cross(s, along);
+    float u = dot(s, p) * scale, v = dot(direction, q) * scale;
+    return u >= 0.0 && v >= 0.0 && u + v <= 1.0 && dot(aside, q) * scale > 0.0;
+}
+
+bool meets_leaf(vec3 origin, vec3 direction, uint leaf) {
+    uint first = leaf * tree_shape.y;
+    for (uint i = first; i < first + tree_shape.y; ++i)
+        if (meets_triangle(origin, direction, i)) return true;
+    return false;
+}
+
+// A ray from a relative position.
+bool meets_anything(vec3 position, vec3 direction) {
+    vec3 origin = position + tree_from_relative;
+    vec3 scale = 1.0 / mix(direction, vec3(1e-20), lessThan(abs(direction), vec3(1e-20)));
+    uint node = 1u;
+    do {
+        vec3 a = (tree_boxes[2u * node].xyz - origin) * scale, b = (tree_boxes[2u * node + 1u].xyz - origin) * scale;
+        vec3 near = min(a, b), far = max(a, b);
+        bool inside = min(min(far.x, far.y), far.z) >= max(max(max(near.x, near.y), near.z), 0.0);
+        if (inside && node < tree_shape.x) {
+            node *= 2u;
+            continue;
+        }
+        if (inside && meets_leaf(origin, direction, node - tree_shape.x)) return true;
+        ++node;
+        node >>= findLSB(node);
+    } while (node != 1u);
+    return false;
+}
