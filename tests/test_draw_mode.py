@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from pxr import Usd
 from defshade_cli.image.reading import read as read_image
 from defshade_cli.image.texture import world_to_screen
 from defshade_cli.rendering import render
-from defshade_cli.scene.geometry import world_boxes
+from defshade_cli.scene.geometry import enclose, world_boxes
 from defshade_cli.scene.scene import Scene
 from defshade_cli.usd.reader import StageReader
 from stages import move, read, stage_of
@@ -49,7 +50,7 @@ def paths(scene: Scene) -> set[str]:
 
 def bounds(scene: Scene) -> np.ndarray:
     (drawable,) = scene.drawables
-    return world_boxes(scene.meshes[drawable.mesh].bounds, drawable.world_from_object)[0]
+    return enclose([world_boxes(scene.meshes[drawable.mesh].bounds, drawable.world_from_object)])
 
 
 @pytest.mark.parametrize("drawn", ["bounds", "origin", "cards"])
@@ -80,7 +81,23 @@ def test_bounds_are_the_models_edges() -> None:
     scene = read(model(mode("bounds") + move(x=10)))
     width = 0.008 * np.linalg.norm(np.subtract(HIGH, LOW))
     np.testing.assert_allclose(bounds(scene) - [10, 0, 0], [np.subtract(LOW, width / 2), np.add(HIGH, width / 2)])
-    assert len(scene.meshes[0].triangles) == 12 * 12, "twelve edges, each a bar"
+    assert len(scene.drawables[0].world_from_object) == 12, "twelve edges, each a bar"
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.01])
+def test_lines_are_no_thinner_than_a_pixel(scale: float) -> None:
+    """Seen from 100 away by a camera of 45 degrees, 64 pixels are 2 * 100 * tan(22.5°) units."""
+    eye = f"""def Camera "eye" {{
+        float horizontalAperture = {20 * math.tan(math.pi / 8)}
+        float verticalAperture = {20 * math.tan(math.pi / 8)}
+        float focalLength = 10
+        {move(z=100)}
+    }}"""
+    size = f"float3 xformOp:scale = ({scale}, {scale}, {scale})\nuniform token[] xformOpOrder = ['xformOp:scale']"
+    (drawable,) = StageReader(stage_of(model(mode("bounds") + size) + eye), size=(64, 64)).read(None).drawables
+    pixel = 200 * math.tan(math.pi / 8) / 64
+    widths = np.linalg.norm(drawable.world_from_object[:, :3, 1:3], axis=1)
+    np.testing.assert_allclose(widths, pixel, rtol=0.04 * scale)
 
 
 def test_the_hint_of_extents_goes_before_the_geometry() -> None:
@@ -239,7 +256,7 @@ def test_prototypes_of_an_instancer_inherit_its_mode() -> None:
         {model()}
     }}"""
     (drawable,) = read(text).drawables
-    assert drawable.paths == ("/swarm/model",) and len(drawable.world_from_object) == 2
+    assert drawable.paths == ("/swarm/model",) and drawable.instance_ids.tolist() == [0] * 12 + [1] * 12
 
 
 def test_a_stand_in_is_the_same_object_in_every_frame() -> None:

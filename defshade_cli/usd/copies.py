@@ -15,6 +15,7 @@ class Copies:
 
     object_from_copy: (N, 4, 4) float64.  ids: (N,) int32, which they are of those `authored`.
     display_color, display_opacity: (N, 3) and (N,) float32, NaN where nothing is authored.
+    lines: they are bars along x, which are seen no thinner than a pixel; else they stay round, see `rounded`.
     """
 
     object_from_copy: NDArray[np.float64]
@@ -22,6 +23,7 @@ class Copies:
     display_color: NDArray[np.float32]
     display_opacity: NDArray[np.float32]
     authored: int = 1
+    lines: bool = False
 
     @property
     def positions(self) -> NDArray[np.float32]:
@@ -45,6 +47,18 @@ def once(display_color: NDArray[np.float32] | None = None, display_opacity: floa
         np.full(1, -1, np.int32),
         np.full((1, 3), color, np.float32),
         np.full(1, opacity, np.float32),
+    )
+
+
+def bars(object_from_copy: NDArray[np.float64]) -> Copies:
+    """Lines between places, (N, 4, 4) of the unit bar from 0 to 1 along x."""
+    count = len(object_from_copy)
+    return Copies(
+        object_from_copy,
+        np.full(count, -1, np.int32),
+        np.full((count, 3), np.nan, np.float32),
+        np.full(count, np.nan, np.float32),
+        lines=True,
     )
 
 

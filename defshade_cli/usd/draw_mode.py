@@ -6,6 +6,8 @@ model:applyDrawMode  where it takes effect: on components, unless they say no, a
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Kind, Sdf, Usd, UsdGeom
@@ -14,6 +16,7 @@ from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.scene.texture import SeenFrom
 from defshade_cli.usd.cards import UNTEXTURED, read_card_material, read_cards
+from defshade_cli.usd.copies import bars
 from defshade_cli.usd.geometry import Surface
 from defshade_cli.usd.material import ReadMaterial
 from defshade_cli.usd.polygons import Polygons
@@ -27,7 +30,7 @@ _NO_COLOR = (0.18, 0.18, 0.18)
 """The schema's, for models to which it is not applied."""
 
 _LINE_WIDTH = 0.008
-"""Of the diagonal of what is drawn in lines, which in a viewer are a pixel wide."""
+"""Of the diagonal of what is drawn in lines, which are no thinner than a pixel, and in a viewer no wider."""
 
 _BOX_FACES = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
 _BITS = np.array([[corner >> 2 & 1, corner >> 1 & 1, corner & 1] for corner in range(8)])
@@ -66,18 +69,14 @@ class StandIns:
     def read(self, prim: Usd.Prim, mode: str) -> Surface:
         """The stand-in in the model's space. Its groups are bound to properties of the prim, see read_material."""
         path, issues = str(prim.GetPath()), list[str]()
-        group: NDArray[np.intp] | None = None
-        names: tuple[str, ...] = (_COLOR,)
         if mode == UsdGeom.Tokens.origin:
-            polygons = _lines(np.array([[0.0] * 3, [1.0] * 3]), _AXES)
-        else:
-            box = self._box(prim)
-            if box is None:
-                return _surface(path, (), _lines(np.zeros((2, 3)), _AXES[:0]), None, ["it has no bounds to draw"])
-            if mode == UsdGeom.Tokens.cards:
-                polygons, names, group = read_cards(prim, box, issues, self._seen_from)
-            else:
-                polygons = _lines(box, _EDGES)
+            return _lines(path, np.array([[0.0] * 3, [1.0] * 3]), _AXES)
+        box = self._box(prim)
+        if box is None:
+            return _surface(path, (), _bar(), None, ["it has no bounds to draw"])
+        if mode != UsdGeom.Tokens.cards:
+            return _lines(path, box, _EDGES)
+        polygons, names, group = read_cards(prim, box, issues, self._seen_from)
         return _surface(path, names, polygons, group, issues)
 
     def _box(self, prim: Usd.Prim) -> NDArray[np.float64] | None:
@@ -110,16 +109,25 @@ def _surface(
     return Surface(path, polygons, None, faces, groups, False, None, None, None, reported)
 
 
-def _lines(box: NDArray[np.float64], edges: NDArray[np.intp]) -> Polygons:
-    """Edges (E, 2) between corners of a box as thin bars; corners are numbered by the bits of x, y and z."""
-    corners = np.where(_BITS, box[1], box[0])
-    half = 0.5 * _LINE_WIDTH * float(np.linalg.norm(box[1] - box[0]))
-    low, high = corners[edges[:, 0]] - half, corners[edges[:, 1]] + half
-    points = np.where(_BITS, high[:, None], low[:, None]).reshape(-1, 3)
-    faces = (_BOX_FACES + 8 * np.arange(len(edges))[:, None, None]).reshape(-1, 4)
+def _lines(path: str, box: NDArray[np.float64], edges: NDArray[np.intp]) -> Surface:
+    """Edges (E, 2) between corners of a box, each along an axis; corners are numbered by the bits of x, y and z."""
+    start, end = (np.where(_BITS[edges[:, side]], box[1], box[0]) for side in (0, 1))
+    width = _LINE_WIDTH * float(np.linalg.norm(box[1] - box[0]))
+    axis = np.abs(_BITS[edges[:, 1]] - _BITS[edges[:, 0]]).argmax(axis=1)
+    directions = np.eye(3)[(axis[:, None] + np.arange(3)) % 3]
+    sizes = np.full((len(edges), 3), width)
+    sizes[:, 0] += np.abs(end - start).sum(axis=1)
+    object_from_bar = np.tile(np.eye(4), (len(edges), 1, 1))
+    object_from_bar[:, :3, :3] = (directions * sizes[..., None]).transpose(0, 2, 1)
+    object_from_bar[:, :3, 3] = start - 0.5 * width * directions[:, 0]
+    return replace(_surface(path, (_COLOR,), _bar(), None, []), copies=bars(object_from_bar))
+
+
+def _bar() -> Polygons:
+    """Along x from 0 to 1, and 1 wide."""
     return Polygons(
-        points=points.astype(np.float32),
-        counts=np.full(len(faces), 4),
-        indices=faces.ravel(),
-        faces=np.arange(len(faces), dtype=np.int32),
+        points=(_BITS - (0.0, 0.5, 0.5)).astype(np.float32),
+        counts=np.full(len(_BOX_FACES), 4),
+        indices=_BOX_FACES.ravel(),
+        faces=np.arange(len(_BOX_FACES), dtype=np.int32),
     )

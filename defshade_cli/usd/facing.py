@@ -1,5 +1,6 @@
-"""Points and curves where the camera is known, which at a fixed complexity face it, as Hydra draws them.
+"""What depends on where the camera is: lines, and points and curves that at a fixed complexity face it, as in Hydra.
 
+lines    of models in draw modes are a part of the model's size wide, and no thinner than a pixel
 auto     points are spheres, round under any transform, and curves are tubes
 fixed    points are disks across the view, of their width as it is seen where they stand; curves see usd/strands.py
 """
@@ -30,7 +31,9 @@ _WIDEST = 100.0
 def faced(placed: Iterable[PlacedSurface], view: View, level: int | None) -> Iterator[PlacedSurface]:
     """The surfaces as `view` has them at a level of refinement, None for what they are from all sides."""
     for piece, surface in placed:
-        if surface.copies is not None:
+        if surface.copies is not None and surface.copies.lines:
+            yield _thickened(piece, view), surface
+        elif surface.copies is not None:
             spheres = replace(piece, root_from_object=rounded(piece.root_from_object))
             shown = spheres if level is None else _disks(spheres, view)
             if len(shown.ids):
@@ -39,6 +42,17 @@ def faced(placed: Iterable[PlacedSurface], view: View, level: int | None) -> Ite
             yield from _strips(piece, surface, view, level)
         else:
             yield piece, surface
+
+
+def _thickened(bars: Piece, view: View) -> Piece:
+    """Bars along x, as wide as a pixel is where their middles are seen, unless they are wider."""
+    placed = bars.root_from_object
+    middles = transform_points(view.camera.camera_from_world, placed[:, :3, 3] + 0.5 * placed[:, :3, 0])
+    across = np.linalg.norm(placed[:, :3, 1:3], axis=1)
+    pixels = across * view.pixels_at(-middles[:, 2])[:, None]
+    thick = placed.copy()
+    thick[:, :3, 1:3] /= np.where(pixels > 0.0, np.minimum(pixels, 1.0), 1.0)[:, None]
+    return replace(bars, root_from_object=thick)
 
 
 def _disks(spheres: Piece, view: View) -> Piece:
