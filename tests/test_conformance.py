@@ -18,7 +18,7 @@ from defshade_cli.image.snapshot import write_snapshot
 from defshade_cli.measure.conformance import batch
 from defshade_cli.measure.conformance.arnold import read_as_arnold
 from defshade_cli.measure.conformance.catalogue import assets_folder, read_item
-from defshade_cli.measure.conformance.conditions import under
+from defshade_cli.measure.conformance.conditions import under, with_bare
 from defshade_cli.measure.conformance.drawing import draw
 from defshade_cli.measure.conformance.page import page_of
 from defshade_cli.measure.conformance.report import report_of, summary_of, tables_of
@@ -77,14 +77,13 @@ def test_arnold_hides_geometry_from_the_camera_and_keeps_the_light_of_lights() -
     scene = StageReader(stage).read(None)
     assert [drawable.paths for drawable in scene.drawables] == [("/c",)]
     assert [light.path for light in scene.lights] == ["/l"]
-    np.testing.assert_array_equal(scene.drawables[0].display_color, [[1.0, 1.0, 1.0]])
 
 
-def test_arnolds_white_gives_way_to_a_colour_from_above() -> None:
-    colored = 'def Xform "x" {\n color3f[] primvars:displayColor = [(1, 0, 0)]\n def Cube "c" {}\n}'
-    stage = stage_of(colored)
-    read_as_arnold(stage)
-    np.testing.assert_array_equal(StageReader(stage).read(None).drawables[0].display_color, [[1.0, 0.0, 0.0]])
+def test_what_has_no_colour_has_the_renderers_own(tmp_path: Path) -> None:
+    (case,) = read_item(item(tmp_path, {"image": "a.tif", "command": "kick cube.usda -r 16 9"}))
+    red = 'def Cube "r" {\n color3f[] primvars:displayColor = [(1, 0, 0)]\n}'
+    scene = with_bare(case.conditions, StageReader(stage_of(f'def Cube "c" {{}}\n{red}')).read(None))
+    np.testing.assert_array_equal(np.concatenate([d.display_color for d in scene.drawables]), [[1, 1, 1], [1, 0, 0]])
 
 
 def test_a_stage_without_references_is_a_case(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 arnold-usd, libs/translator/reader/read_geometry.cpp: meshes are not subdivided, unless
 `primvars:arnold:subdiv_iterations` asks for it; `primvars:arnold:visibility:camera` hides prims from the camera.
-A light that it hides shines on. Without a shader and a displayColor prims are white: kick's own, `-sm lambert`.
+A light that it hides shines on.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from typing import Any
 
 _ITERATIONS = "primvars:arnold:subdiv_iterations"
 _SEEN = "primvars:arnold:visibility:camera"
-_COLOR = "primvars:displayColor"
 
 
 def read_as_arnold(stage: Any) -> None:
@@ -22,10 +21,3 @@ def read_as_arnold(stage: Any) -> None:
             prim.GetAttribute("subdivisionScheme").Set("none")
         if prim.GetAttribute(_SEEN).Get() is False and not prim.HasAPI("LightAPI"):
             prim.GetAttribute("visibility").Set("invisible")
-        if prim.HasAttribute(_COLOR) and not _has_color(prim):
-            prim.GetAttribute(_COLOR).Set([(1.0, 1.0, 1.0)])
-
-
-def _has_color(prim: Any) -> bool:
-    """Its own displayColor, or one from above."""
-    return bool(prim) and (prim.GetAttribute(_COLOR).HasAuthoredValue() or _has_color(prim.GetParent()))

@@ -42,6 +42,7 @@ class Conditions:
     clip_planes: (a, b, c, d) each, in camera space, as UsdGeomCamera has them.
     camera_light: the distant light stands where the drawing test puts one for `-camlight`.
     background: scene-linear, opaque; None is transparent black.
+    bare: the albedo that the renderer gives to what has neither material nor displayColor; None for our own.
     """
 
     size: tuple[int, int] | None = None
@@ -56,6 +57,7 @@ class Conditions:
     lighting: Lighting = "stage"
     camera_light: bool = False
     background: tuple[float, float, float] | None = None
+    bare: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +135,7 @@ def _storm(reference: Mapping[str, Any], command: str) -> Conditions:
         lighting=_lighting(options),
         camera_light="camlight" in options,
         background=tuple(reference["background_linear"][:3]),
+        bare=0.5,
     )
 
 
@@ -181,11 +184,11 @@ def _usdrecord(reference: Mapping[str, Any], command: str) -> Conditions:
 
 
 def _arnold(reference: Mapping[str, Any], command: str) -> Conditions:
-    """kick's later options win; without a frame it renders frame 1."""
+    """kick's later options win; without a frame it renders frame 1, and `-sm lambert` has what is bare white."""
     options = _options(command)
     width, height = options["r"][-1]
     frame = float(options["frame"][-1][0]) if "frame" in options else 1.0
-    return Conditions(size=(int(width), int(height)), frame=frame, conform="adjustApertureHeight")
+    return Conditions(size=(int(width), int(height)), frame=frame, conform="adjustApertureHeight", bare=1.0)
 
 
 def _readme_options(stage: Path) -> str:

@@ -39,6 +39,17 @@ def under(conditions: Conditions, scene: Scene, extent: NDArray[np.float64]) -> 
     return replace(scene, camera=_camera(conditions, scene), materials=materials, pixel_aspect=1.0)
 
 
+def with_bare(conditions: Conditions, scene: Scene) -> Scene:
+    """The scene with what has no colour of its own as the reference's renderer colours it."""
+    if conditions.bare is None:
+        return scene
+    bare, unauthored = np.float32(conditions.bare), np.float32(UNBOUND.diffuse_color)
+    colors = [d.display_color for d in scene.drawables]
+    colors = [np.where((color == unauthored).all(axis=1, keepdims=True), bare, color) for color in colors]
+    drawables = (replace(d, display_color=color) for d, color in zip(scene.drawables, colors, strict=True))
+    return replace(scene, drawables=tuple(drawables))
+
+
 def _translation(conditions: Conditions, scene: Scene, extent: NDArray[np.float64]) -> Vector | None:
     """What the drawing test moves the stage by. Where Z is up it gives the depth of the box's centre the wrong sign."""
     if conditions.translate != "frame":

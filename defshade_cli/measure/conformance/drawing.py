@@ -14,7 +14,7 @@ from defshade_cli.image.film import Film
 from defshade_cli.image.reading import read
 from defshade_cli.measure.conformance.arnold import read_as_arnold
 from defshade_cli.measure.conformance.catalogue import Case
-from defshade_cli.measure.conformance.conditions import under
+from defshade_cli.measure.conformance.conditions import under, with_bare
 from defshade_cli.measure.conformance.silhouette import (
     ANY_SAMPLE,
     HALF,
@@ -123,9 +123,9 @@ def _scene(case: Case, stage: Any, reader: StageReader, size: tuple[int, int]) -
     frame = reader.first_frame() if conditions.frame == "first" else conditions.frame
     scene = under(conditions, reader.read(frame), stage_extent(stage, conditions.purposes))
     if conditions.background is None:
-        return scene
+        return with_bare(conditions, scene)
     seen = _reader(case, stage, size, framing=Held(scene.camera), beside=reader).read(frame)
-    return replace(scene, meshes=seen.meshes, drawables=seen.drawables)
+    return with_bare(conditions, replace(scene, meshes=seen.meshes, drawables=seen.drawables))
 
 
 def _size(case: Case, reference: Picture | None) -> tuple[int, int]:
