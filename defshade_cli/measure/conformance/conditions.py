@@ -35,19 +35,19 @@ def under(conditions: Conditions, scene: Scene, extent: NDArray[np.float64]) -> 
     if conditions.lighting == "distant":
         authored = tuple(light for light in scene.lights if not light.path.startswith("<"))
         scene = replace(scene, lights=(*authored, _distant(conditions, translation)))
-    materials = tuple(_MATTE if material.path == UNBOUND.path else material for material in scene.materials)
-    return replace(scene, camera=_camera(conditions, scene), materials=materials, pixel_aspect=1.0)
+    return replace(scene, camera=_camera(conditions, scene), pixel_aspect=1.0)
 
 
 def with_bare(conditions: Conditions, scene: Scene) -> Scene:
-    """The scene with what has no colour of its own as the reference's renderer colours it."""
+    """The scene with what has no material as the reference's renderer shades it: matte."""
     if conditions.bare is None:
         return scene
-    bare, unauthored = np.float32(conditions.bare), np.float32(UNBOUND.diffuse_color)
+    bare, unauthored = np.float32(conditions.bare), np.array(UNBOUND.diffuse_color, np.float32)
     colors = [d.display_color for d in scene.drawables]
     colors = [np.where((color == unauthored).all(axis=1, keepdims=True), bare, color) for color in colors]
     drawables = (replace(d, display_color=color) for d, color in zip(scene.drawables, colors, strict=True))
-    return replace(scene, drawables=tuple(drawables))
+    materials = tuple(_MATTE if material.path == UNBOUND.path else material for material in scene.materials)
+    return replace(scene, drawables=tuple(drawables), materials=materials)
 
 
 def _translation(conditions: Conditions, scene: Scene, extent: NDArray[np.float64]) -> Vector | None:

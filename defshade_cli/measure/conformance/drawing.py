@@ -150,7 +150,7 @@ def _render(
 ) -> tuple[Picture, Picture]:
     """(H, W, 4) scene-linear, premultiplied, and (H, W) what geometry covers; where Storm drew, by its samples."""
     if case.maker not in ("storm", "usdrecord"):
-        pixels = _filtered(pipeline, scene, reader, replace(settings, samples=SAMPLES[case.maker]))
+        pixels = _filtered(case, pipeline, scene, reader, replace(settings, samples=SAMPLES[case.maker]))
         return pixels, pixels[..., 3]
     unlit = case.conditions.lighting == "unlit"
     settings = replace(settings, layers=("depth", "albedo" if unlit else "beauty"))
@@ -174,11 +174,11 @@ def _blends(pipeline: Pipeline, scene: Scene, coins: RenderSettings) -> bool:
     return bool(((alpha > 0.0) & (alpha < 1.0)).any())
 
 
-def _filtered(pipeline: Pipeline, scene: Scene, reader: StageReader, settings: RenderSettings) -> Picture:
+def _filtered(case: Case, pipeline: Pipeline, scene: Scene, reader: StageReader, settings: RenderSettings) -> Picture:
     """The beauty as the program renders it, while the shutter is open."""
     plan = make_plan(scene, settings)
-    moments = plan_moments(plan, reader.read_shutter(scene, plan.moments), settings)
-    return pipeline.render(scene, plan, moments).layers["beauty"]
+    moments = (with_bare(case.conditions, moment) for moment in reader.read_shutter(scene, plan.moments))
+    return pipeline.render(scene, plan, plan_moments(plan, moments, settings)).layers["beauty"]
 
 
 def _taken(pipeline: Pipeline, scene: Scene, settings: RenderSettings, places: Places) -> Iterator[Film]:
