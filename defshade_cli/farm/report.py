@@ -85,7 +85,8 @@ def _tile(frame: dict[str, Any]) -> str:
     name = "default" if frame["frame"] is None else f"{frame['frame']:g}"
     images = "".join(_image(*image) for image in frame["images"].items())
     cost = "skipped" if frame["skipped"] else f"{sum(frame['seconds'].values()):.2f} s"
-    samples = f", {frame['samples']} samples" if "samples" in frame else ""
+    count = frame.get("samples", 0)
+    samples = f", {count} sample{'s' * (count != 1)}" if count else ""
     said = frame["failure"] or frame["log"].strip()
     kind = "failed" if frame["failure"] else "warned" if said else "fine"
     caption = f"<figcaption><b>{name}</b> {cost}{samples}</figcaption>"

@@ -95,7 +95,7 @@ def _legend(bench: Bench) -> Iterator[str]:
         yield f'<circle cx="{_WIDTH - 100:.0f}" cy="{y}" r="4.5" fill="{_COLORS[layout]}"/>'
         yield _text(_WIDTH - 88, y + 4, layout)
     if not all(trial.choice.shadows for trial in bench.trials):
-        yield _text(_WIDTH - 105, 66 + 18 * len(shown) + 4, "○ no shadows")
+        yield _text(_WIDTH - 112, 66 + 18 * len(shown) + 4, "○ no shadows")
 
 
 def _text(x: float, y: float, text: str, anchor: str = "start") -> str:

@@ -8,7 +8,6 @@ from typing import Literal
 from defshade_cli.settings import Filter, Layout, RenderSettings
 
 Cost = Literal["wall", "cpu"]
-COSTS: tuple[Cost, ...] = ("wall", "cpu")
 
 
 @dataclass(frozen=True, slots=True)

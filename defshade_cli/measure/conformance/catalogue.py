@@ -24,7 +24,6 @@ Lighting = Literal["stage", "unlit", "distant"]
 Options = Mapping[str, Sequence[Sequence[str]]]
 Rectangle = tuple[float, float, float, float]
 
-STORM_BACKGROUND = (1.0, 0.5, 0.1)
 _COMPLEXITIES: dict[float, Complexity] = {1.0: "low", 1.1: "medium", 1.2: "high", 1.3: "veryhigh"}
 
 
