@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
@@ -133,7 +133,13 @@ class Drawable:
         freeze = object.__setattr__
         freeze(self, "world_from_object", frozen(self.world_from_object, np.float64, count, 4, 4))
         freeze(self, "instance_ids", frozen(self.instance_ids, np.int32, count))
-        sets = np.zeros(count, np.uint32) if self.link_sets is None else self.link_sets
-        freeze(self, "link_sets", frozen(sets, np.uint32, count))
+        linked = self.link_sets is not None
+        freeze(self, "link_sets", frozen(self.link_sets, np.uint32, count) if linked else _in_no_set(count))
         freeze(self, "display_color", frozen(self.display_color, np.float32, count, 3))
         freeze(self, "display_opacity", frozen(self.display_opacity, np.float32, count))
+
+
+@lru_cache(maxsize=64)
+def _in_no_set(count: int) -> NDArray[np.uint32]:
+    """(count,) zeros: of a stage with few links, thousands of drawables have the same."""
+    return frozen(np.zeros(count, np.uint32), np.uint32, count)
