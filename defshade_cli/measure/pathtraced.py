@@ -24,6 +24,7 @@ from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import Matrix, normalize, transform_points
 
+_ROUNDING = 1e-9  # of a window's width
 _CHUNK = 64  # samples that Mitsuba holds in memory at a time
 
 
@@ -92,7 +93,7 @@ def _lens(camera: Camera) -> dict[str, Any]:
             "principal_point_offset_x": -(left + right) / 2.0 / (right - left),
             "principal_point_offset_y": (bottom + top) / 2.0 / (top - bottom),
         }
-    if left + right or bottom + top:
+    if max(abs(left + right), abs(bottom + top)) > _ROUNDING * (right - left):
         raise DefshadeError(f"{camera.path}: path tracing takes no shifted window behind a lens")
     radius = 0.5 * camera.focal_length / camera.f_stop
     return {"type": "thinlens", "aperture_radius": radius, "focus_distance": camera.focus_distance}
