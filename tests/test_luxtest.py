@@ -82,5 +82,7 @@ def test_distant_lights_follow_their_closed_forms(pipeline: Pipeline, luxtest: P
 
 
 def test_the_table_has_a_row_for_each_sweep() -> None:
-    lines = table([Agreement("rect", "focus 2", np.array([0.99, 1.01, 1.2]))]).splitlines()
-    assert lines[2] == "| rect | focus 2 | 3 | 1.010 | 67% | 0.992 … 1.181 |"
+    lines = table(
+        [Agreement("rect", "focus 2", np.array([0.99, 1.01, 1.2]), np.array([True, True, False]))]
+    ).splitlines()
+    assert lines[2] == "| rect | focus 2 | 3 | 1.010 | 67% | 2 of 2 | 0.992 … 1.181 |"

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
@@ -56,11 +57,15 @@ class Sweep:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Agreement:
-    """ratios: (B,) ours over Arnold's, of the blocks' brightest channel."""
+    """ratios: (B,) ours over Arnold's, of the blocks' brightest channel.
+
+    even: (B,) whose neighbours' brightness spreads over less than their own.
+    """
 
     light: str
     shaping: str
     ratios: Array
+    even: NDArray[np.bool_]
 
     @property
     def median(self) -> float:
@@ -70,7 +75,16 @@ class Agreement:
     @property
     def within(self) -> float:
         """Share of blocks within 3 %."""
-        return float(np.mean(np.abs(self.ratios - 1.0) <= 0.03))
+        return float(self._agree.mean())
+
+    @property
+    def within_even(self) -> str:
+        """Of the even blocks, how many are within 3 %."""
+        return f"{self._agree[self.even].sum()} of {self.even.sum()}"
+
+    @property
+    def _agree(self) -> NDArray[np.bool_]:
+        return np.abs(self.ratios - 1.0) <= 0.03
 
 
 def sweeps(assets: Path) -> Iterator[Sweep]:
@@ -98,7 +112,7 @@ def agreement(pipeline: Pipeline, sweep: Sweep, samples: int = SAMPLES) -> Agree
     compared = whole & (bright > _DARKEST) & (bright < _BRIGHTEST)
     channel = arnold[compared].argmax(axis=-1)[:, None]
     ratios = np.take_along_axis(ours[compared], channel, 1) / np.take_along_axis(arnold[compared], channel, 1)
-    return Agreement(scene.lights[0].kind, _shaping(scene), ratios[:, 0])
+    return Agreement(scene.lights[0].kind, _shaping(scene), ratios[:, 0], _are_even(ours.max(axis=-1))[compared])
 
 
 def _rough(scene: Scene) -> Scene:
@@ -143,6 +157,12 @@ def _blocks(image: Array) -> Array:
     return image.reshape(height // _BLOCK, _BLOCK, width // _BLOCK, _BLOCK, channels).mean(axis=(1, 3))
 
 
+def _are_even(brightness: Array) -> NDArray[np.bool_]:
+    """(h, w) blocks beside which nothing changes fast: no rim of a cone, no foot of a light."""
+    around = sliding_window_view(np.pad(brightness, 1, mode="edge"), (3, 3))
+    return around.max(axis=(2, 3)) - around.min(axis=(2, 3)) < brightness
+
+
 def _shaping(scene: Scene) -> str:
     shaping = scene.lights[0].shaping
     assert shaping
@@ -156,12 +176,12 @@ def _shaping(scene: Scene) -> str:
 def table(results: list[Agreement]) -> str:
     """Markdown: one row a sweep."""
     rows = [
-        f"| {r.light} | {r.shaping} | {len(r.ratios)} | {r.median:.3f} | {r.within:.0%} |"
+        f"| {r.light} | {r.shaping} | {len(r.ratios)} | {r.median:.3f} | {r.within:.0%} | {r.within_even} |"
         f" {np.percentile(r.ratios, 5):.3f} … {np.percentile(r.ratios, 95):.3f} |"
         for r in results
     ]
-    head = "| light | shaping | blocks | median of ours / Arnold's | within 3 % | 5th … 95th percentile |"
-    return "\n".join([head, "|---|---|---:|---:|---:|---|", *rows])
+    head = "| light | shaping | blocks | median of ours / Arnold's | within 3 % | even floor | 5th … 95th percentile |"
+    return "\n".join([head, "|---|---|---:|---:|---:|---:|---|", *rows])
 
 
 def main(assets: Path, page: Path) -> None:
