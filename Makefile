@@ -82,6 +82,7 @@ bench: .venv/.ready-reference
 
 accuracy: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.accuracy docs/accuracy.md
+	$(BIN)/python -m defshade_cli.measure.accuracy_plot docs/accuracy.md
 
 error-check: .venv/.ready-reference
 	$(BIN)/python -m defshade_cli.measure.convergence docs/accuracy.md

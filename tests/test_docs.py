@@ -13,6 +13,7 @@ import pytest
 from defshade_cli import cli
 from defshade_cli.cli.reference import reference
 from defshade_cli.image.layers import LAYERS
+from defshade_cli.measure.accuracy_plot import accuracy_plot, errors_in
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "shaders").rglob("*.md")])
@@ -31,6 +32,14 @@ def test_command_and_options_have_help(name: str) -> None:
 def test_reference_is_up_to_date() -> None:
     page = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
     assert page == reference(), "docs/commands.md is stale: run `make docs`"
+
+
+def test_plot_of_accuracy_is_up_to_date() -> None:
+    errors = errors_in((ROOT / "docs" / "accuracy.md").read_text(encoding="utf-8"))
+    assert len(errors) > 20
+    plot = (ROOT / "docs" / "images" / "accuracy.svg").read_text(encoding="utf-8")
+    stale = "docs/images/accuracy.svg is stale: run `python -m defshade_cli.measure.accuracy_plot docs/accuracy.md`"
+    assert plot == accuracy_plot(errors), stale
 
 
 @pytest.mark.parametrize("name", COMMANDS)

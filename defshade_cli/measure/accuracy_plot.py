@@ -1,0 +1,76 @@
+"""The table of docs/accuracy.md as a plot: error against samples, a line a stage.
+
+`python -m defshade_cli.measure.accuracy_plot PAGE` draws what the page has into images/accuracy.svg beside it.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from defshade_cli.measure.axes import HEIGHT, MARGIN, OPENING, WIDTH, Axis, grid, text
+
+_SAMPLES = (1, 16, 256)
+_ROW = re.compile(r"^\| (\w+) \|" + r" ([\de.+-]+|not run) \|" * len(_SAMPLES), re.MULTILINE)
+_BOUNDS = {16: 1e-2, 256: 2e-3}
+"""relMSE that is asked for."""
+
+_FAMILIES = {"dome": ("domes", "#27519c"), "distant": ("distant lights", "#2a7f62"), "": ("other stages", "#c1440e")}
+"""How a stage's name begins → what its line is called, and its colour."""
+
+Errors = Mapping[str, Mapping[int, float]]
+
+
+def errors_in(page: str) -> Errors:
+    """Stage → samples → relMSE of the table in a page; what was not run is left out."""
+    table = page.partition("<!-- generated: accuracy -->")[2].partition("<!-- end")[0]
+    rows = ((row[0], zip(_SAMPLES, row[1:], strict=True)) for row in _ROW.findall(table))
+    return {stage: {count: float(told) for count, told in row if told != "not run"} for stage, row in rows}
+
+
+def accuracy_plot(errors: Errors) -> str:
+    """An SVG document; dashes rise where relMSE halves as samples double, ticks are the bounds."""
+    x = Axis.around(_SAMPLES, MARGIN, WIDTH - 24.0)
+    y = Axis.around([each for row in errors.values() for each in row.values()], HEIGHT - MARGIN, 52.0)
+    fair = f"{x.at(1):.1f},{y.at(1e-2):.1f} {x.at(256):.1f},{y.at(1e-2 / 256):.1f}"
+    lines = [
+        *OPENING,
+        *grid(x, y),
+        text((x.first + x.last) / 2, HEIGHT - 20, "samples a pixel", "middle"),
+        text(12, 34, "relMSE"),
+        f'<polyline class="front" points="{fair}"/>',
+        *(_line(stage, row, x, y) for stage, row in errors.items()),
+        *(_bound(x.at(count), y.at(bound)) for count, bound in _BOUNDS.items()),
+        *_legend(),
+        "</svg>",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _line(stage: str, row: Mapping[int, float], x: Axis, y: Axis) -> str:
+    _, color = next(family for start, family in _FAMILIES.items() if stage.startswith(start))
+    points = " ".join(f"{x.at(count):.1f},{y.at(error):.1f}" for count, error in row.items())
+    return f'<polyline points="{points}" stroke="{color}" stroke-opacity="0.7"><title>{stage}</title></polyline>'
+
+
+def _bound(x: float, y: float) -> str:
+    return f'<line x1="{x - 14:.1f}" x2="{x + 14:.1f}" y1="{y:.1f}" y2="{y:.1f}" stroke="#333" stroke-width="2"/>'
+
+
+def _legend() -> Iterator[str]:
+    for row, (name, color) in enumerate(_FAMILIES.values()):
+        at = 66 + 18 * row
+        yield f'<line x1="{WIDTH - 140:.0f}" x2="{WIDTH - 120:.0f}" y1="{at}" y2="{at}" stroke="{color}"/>'
+        yield text(WIDTH - 112, at + 4, name)
+
+
+def main(page: Path) -> None:
+    """Draw what the table of the page says."""
+    plot = accuracy_plot(errors_in(page.read_text(encoding="utf-8")))
+    (page.parent / "images" / "accuracy.svg").write_text(plot, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
