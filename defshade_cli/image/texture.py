@@ -65,34 +65,49 @@ class TexelImage:
     srgb: bool
     wrap: tuple[Wrap, Wrap] = ("black", "black")
 
-
-@dataclass(frozen=True, slots=True)
-class _Header:
-    width: int
-    height: int
-    channels: int
-    eight_bit: bool
-    wrap: tuple[Wrap, Wrap]
-
-    def bytes_at(self, side: float) -> float:
-        """On the device, no side longer than `side`."""
-        shrunk = min(1.0, side / max(self.width, self.height))
-        texel = (1 if self.channels == 1 else 4) * (1 if self.eight_bit else 2)
-        return self.width * self.height * shrunk * shrunk * texel * _MIPS
+    @property
+    def bytes(self) -> float:
+        """On the device."""
+        return self.texels.nbytes * _MIPS
 
 
 def load_images(sources: Mapping[Source, float]) -> dict[Source, TexelImage]:
     """Every image that can be read, of the texels a side that it is worth, within BUDGET.
 
-    What cannot be read is logged and left out.
+    Each file is opened once, since some formats decode as they are opened. What cannot be read is logged and left out.
     """
-    headers = dict(_each(_read_header, sources))
-    worth = {source: min(LARGEST, max(side, _SMALLEST)) for source, side in sources.items()}
-    side = LARGEST
-    while side > _SMALLEST and sum([h.bytes_at(min(side, worth[s])) for s, h in headers.items()]) > BUDGET:
-        side //= 2
-    sides = {source: int(min(side, worth[source])) for source in headers}
-    return dict(_each(lambda source: _read_image(source, headers[source], sides[source]), headers))
+    held = _Held()
+
+    def read(source: Source) -> TexelImage:
+        return _read_image(source, int(min(held.largest, max(sources[source], _SMALLEST))))
+
+    for source, image in _each(read, sources):
+        held.add(source, image)
+    return held.images
+
+
+class _Held:
+    """Images within BUDGET. largest: texels a side, halved whenever one more would pass it."""
+
+    def __init__(self) -> None:
+        self.images: dict[Source, TexelImage] = {}
+        self.largest = LARGEST
+        self._bytes = 0.0
+
+    def add(self, source: Source, image: TexelImage) -> None:
+        self.images[source] = image = _no_larger(image, self.largest)
+        self._bytes += image.bytes
+        while self._bytes > BUDGET and self.largest > _SMALLEST:
+            self.largest //= 2
+            log.info("textures: reduced to %d texels a side, which their budget holds", self.largest)
+            self.images = {source: _no_larger(image, self.largest) for source, image in self.images.items()}
+            self._bytes = sum(image.bytes for image in self.images.values())
+
+
+def _no_larger(image: TexelImage, side: int) -> TexelImage:
+    if max(image.texels.shape[:2]) <= side:
+        return image
+    return replace(image, texels=reduced(image.texels, side, srgb=image.srgb))
 
 
 def resized(image: TexelImage, size: tuple[int, int]) -> TexelImage:
@@ -123,33 +138,30 @@ def _each(read: Callable[[Source], _T], sources: Iterable[Source]) -> Iterator[t
                 log.warning("texture %s: %s", source.file.path, error)
 
 
-def _read_header(source: Source) -> _Header:
+def _read_image(source: Source, side: int) -> TexelImage:
     with _opened(source.file) as image:
         spec = image.spec()
-        modes = str(spec.getattribute("wrapmodes") or "").split(",")
-        wrap = _WRAPS.get(modes[0], "black"), _WRAPS.get(modes[-1], "black")
-        return _Header(spec.width, spec.height, spec.nchannels, spec.format == oiio.UINT8, wrap)
-
-
-def _read_image(source: Source, header: _Header, side: int) -> TexelImage:
-    kind = oiio.UINT8 if header.eight_bit else oiio.FLOAT
-    with _opened(source.file) as image:
-        pixels = image.read_image(0, _level(image, side), 0, min(header.channels, 4), kind)
+        channels, eight_bit, wrap = spec.nchannels, spec.format == oiio.UINT8, _wraps(spec)
+        if max(spec.width, spec.height) > side:
+            log.info("texture %s: reduced to %d texels a side", source.file.path, side)
+        kind = oiio.UINT8 if eight_bit else oiio.FLOAT
+        pixels = image.read_image(0, _level(image, side), 0, min(channels, 4), kind)
         if pixels is None:
             raise OSError(image.geterror())
-    colored = header.channels >= 3
-    srgb = source.color_space == "sRGB" or (source.color_space == "auto" and header.eight_bit and colored)
-    if max(header.width, header.height) > side:
-        log.info("texture %s: reduced to %d texels a side", source.file.path, side)
+    srgb = source.color_space == "sRGB" or (source.color_space == "auto" and eight_bit and channels >= 3)
     if max(pixels.shape[:2]) > side:
-        pixels = reduced(pixels, side, srgb=srgb and header.eight_bit)
-    texels = _four_channels(pixels) if colored or header.channels == 2 or srgb else pixels
-    eight_bit = header.eight_bit
+        pixels = reduced(pixels, side, srgb=srgb and eight_bit)
+    texels = _four_channels(pixels) if channels >= 2 or srgb else pixels
     if source.color_space not in STATED_SPACES:
         texels, eight_bit = _in_rec709(texels, source), False
     if not eight_bit:
         texels = _half(_in_light(texels) if srgb else texels)
-    return TexelImage(texels[::-1], srgb and eight_bit, header.wrap)
+    return TexelImage(texels[::-1], srgb and eight_bit, wrap)
+
+
+def _wraps(spec: oiio.ImageSpec) -> tuple[Wrap, Wrap]:
+    modes = str(spec.getattribute("wrapmodes") or "").split(",")
+    return _WRAPS.get(modes[0], "black"), _WRAPS.get(modes[-1], "black")
 
 
 def _in_rec709(texels: NDArray[Any], source: Source) -> NDArray[np.float32]:
