@@ -115,11 +115,11 @@ def test_large_images_are_reduced_and_a_full_budget_halves_them(
 
 def test_a_budget_is_shared_by_all_images(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first is read whole, and halved once the others are there; what was small enough stays as it is."""
-    sides = (64, 64, 16, 64)
+    sides = (256, 256, 64, 256)
     files = [save(tmp_path / f"{i}.png", noise(3, side)) for i, side in enumerate(sides)]
-    monkeypatch.setattr(images, "BUDGET", (3 * 32**2 + 16**2) * 4 * 4 / 3)
+    monkeypatch.setattr(images, "BUDGET", (3 * 128**2 + 64**2) * 4 * 4 / 3 + 1)
     found = load_images({Source(file, "raw"): math.inf for file in files})
-    assert [image.texels.shape[0] for image in found.values()] == [32, 32, 16, 32]
+    assert [image.texels.shape[0] for image in found.values()] == [128, 128, 64, 128]
     np.testing.assert_array_equal(found[Source(files[0], "raw")].texels, found[Source(files[3], "raw")].texels)
 
 
