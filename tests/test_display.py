@@ -55,6 +55,22 @@ def test_looks_and_render_spaces_reach_the_device(gpu: Gpu) -> None:
     )
 
 
+def test_rows_that_stay_are_not_shown_again(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Frame after frame: what is shown is what a new pass shows, of the rows that changed and of no others."""
+    shader = display_shader(display_transform())
+    assert shader is not None
+    kept, drawn, draw = DisplayPass(gpu, shader), [], DisplayPass._draw
+    first = colours(alpha=True)
+    second, smaller = first.copy(), first[:20].copy()
+    second[7:9, 3] *= 0.5
+    for frame in (first, second, second, smaller, smaller):
+        fresh = DisplayPass(gpu, shader).show(frame, straight=True, in_bytes=True)
+        with monkeypatch.context() as patch:
+            patch.setattr(DisplayPass, "_draw", lambda self, part, *a: drawn.append(len(part)) or draw(self, part, *a))
+            np.testing.assert_array_equal(kept.show(frame, straight=True, in_bytes=True), fresh)
+    assert drawn == [48, 2, 20]
+
+
 def test_large_pictures_are_shown_by_the_device(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same picture either way, in formats with alpha and without; half a step of 8 bits may round either way."""
     (tmp_path / "ball.usda").write_text('#usda 1.0\ndef Sphere "ball" {}\ndef DistantLight "sun" {}\n')

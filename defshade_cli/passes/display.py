@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import moderngl
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.targets import allocate
-from defshade_cli.image.colour import finite
+from defshade_cli.image.colour import Pixels, finite
 from defshade_cli.passes.screen import Screen
 
 if TYPE_CHECKING:
@@ -30,15 +30,28 @@ class DisplayPass:
         self._screen = Screen(gpu)
         self._array = self._screen.array(self._program)
         self._tables = {table.sampler: _texture(gpu, table) for table in shader.tables}
+        self._last: dict[tuple[str, bool, bool], tuple[Pixels, NDArray[Any]]] = {}
 
     def show(
-        self, pixels: NDArray[np.float32], *, straight: bool, in_bytes: bool = False
+        self, pixels: Pixels, *, straight: bool, in_bytes: bool = False, of: str = ""
     ) -> NDArray[np.float32] | NDArray[np.uint8]:
         """(H, W, 3 or 4), premultiplied → the same shape in [0, 1], or of bytes, rounded.
 
-        straight: colours come out without their alpha. A band of rows at a time, so that little memory is taken.
-        Raises GpuError.
+        straight: colours come out without their alpha.  of: whose picture it is: rows that are as they were when it was
+        last shown are not worked out again. Raises GpuError.
         """
+        before = self._last.get((of, straight, in_bytes))
+        if before is None or before[0].shape != pixels.shape:
+            shown = self._draw(pixels, straight, in_bytes)
+        else:
+            changed, shown = (pixels != before[0]).any(axis=(1, 2)), before[1].copy()
+            if changed.any():
+                shown[changed] = self._draw(pixels[changed], straight, in_bytes)
+        self._last[of, straight, in_bytes] = pixels, shown
+        return shown
+
+    def _draw(self, pixels: Pixels, straight: bool, in_bytes: bool) -> NDArray[np.float32] | NDArray[np.uint8]:
+        """A band of rows at a time, so that little memory is taken."""
         self._gpu.make_current()
         height, width, channels = pixels.shape
         rows = min(max(_BAND // width, 1), height)

@@ -36,5 +36,5 @@ def shown(film: Film, shot: Shot, renderer: Renderer) -> Film:
     for name, alpha in wanted:
         pixels = bounded(name, film.layers[name], half=True)
         colors = pixels if alpha else pixels[..., :3]
-        images[name, alpha] = display.show(colors, straight=alpha, in_bytes=in_bytes)
+        images[name, alpha] = display.show(colors, straight=alpha, in_bytes=in_bytes, of=name)
     return replace(film, shown=images)
