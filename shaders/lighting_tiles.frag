@@ -16,14 +16,14 @@ void main() {
     vec3 position = position_at(gl_FragCoord.xy, camera_depth(stored));
     Surface surface = read_planes(pixel);
     vec3 v = direction_to_eye(position);
-    float widening = pixel_alpha_squared(surface, pixel);
+    float blur = pixel_alpha_squared(surface, pixel);
     Lit total = Lit(vec3(0.0), vec3(0.0), 0.0, 0.0, float(run.y));
     for (uint i = run.x; i < run.x + run.y; ++i) {
         Light light = light_at(light_lists[i]);
         vec3 l;
         vec3 irradiance = irradiance_from(light, position, l);
         if (irradiance == vec3(0.0) || !is_lit_by(light, surface)) continue;
-        Lit lit = lit_by(light, l, irradiance, surface, position, v, widening);
+        Lit lit = lit_by(light, l, irradiance, surface, position, v, blur);
         total.radiance += lit.radiance;
         total.diffuse += lit.diffuse;
         total.sent += lit.sent;

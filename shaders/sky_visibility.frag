@@ -8,6 +8,11 @@
 flat in Light light;
 out vec4 sent;                     // light of one direction of the sky in a sharp lobe: what reaches it, all, and 1
 
+float widened_roughness(float roughness, float alpha_squared) {
+    float alpha = GGX_alpha(roughness);
+    return sqrt(min(sqrt(alpha * alpha + alpha_squared), 1.0));
+}
+
 // Heitz, Hill & McGuire 2018, "Combining Analytic Direct Illumination and Stochastic Shadows": the sky's image in a sharp
 // lobe, which is known, is multiplied by the share of such light that is not in shadow. The lobe is as wide as the
 // directions are apart, and GGX falls off slowly: where none is near, the nearest decides.

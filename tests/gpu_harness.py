@@ -38,19 +38,23 @@ void main() {{
     if (i >= uint(probes.length())) return;
     Probe p = probes[i];
     Surface s = Surface(p.normal, p.base, p.metallic, p.roughness, vec3(0.0), p.f0, p.f90,
-                        p.clearcoat, p.clearcoat_roughness);
+                        p.clearcoat, p.clearcoat_roughness, BLUR);
     vec3 h = normalize(p.view + p.light);
-    float D = D_GGX(GGX_alpha(s.roughness), dot(s.normal, h), s.normal, h);
+    float D = D_blurred(GGX_alpha(s.roughness), s.blur, dot(s.normal, h), s.normal, h);
     results[i] = vec4(evaluate_brdf(s, p.view, p.light, p.response.xyy), D);
 }}
 """
 
 
 class BrdfHarness:
-    """shaders/lib/surface.glsl behind the signature of measure.brdf; clearcoat always compiled in."""
+    """shaders/lib/surface.glsl behind the signature of measure.brdf; clearcoat always compiled in.
 
-    def __init__(self, gpu: Gpu, shading: Shading) -> None:
-        defines = ["PLANE_CLEARCOAT", *(["CLASSIC"] if shading == "classic" else [])]
+    blur: of the lobes, in alpha²; with none, as the shaders are that know of none.
+    """
+
+    def __init__(self, gpu: Gpu, shading: Shading, blur: float = 0.0) -> None:
+        defines = ["PLANE_CLEARCOAT", f"BLUR {blur:.9f}"]
+        defines += ["CLASSIC"] * (shading == "classic") + ["PATCHES"] * (blur > 0)
         self._context = gpu.context
         self._program = gpu.shaders.compute("brdf_probe.comp", defines, {"brdf_probe.comp": _SOURCE})
 
@@ -61,7 +65,7 @@ class BrdfHarness:
         return self._run(surface, light, response)[:, :3]
 
     def distribution(self, surface: Surface, half: NDArray) -> NDArray[np.float64]:
-        """(P,) D_GGX at half vectors (P, 3): the view and the light both lie along them."""
+        """(P,) D at half vectors (P, 3): the view and the light both lie along them."""
         return self._run(surface, half, (1.0, 1.0), view=half)[:, 3]
 
     def _run(

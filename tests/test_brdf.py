@@ -124,6 +124,22 @@ def test_distribution_of_normals_integrates_to_one(model: Model, roughness: floa
     assert np.trapezoid(integrand, log_angle) == pytest.approx(1.0, abs=model.narrow_precision)
 
 
+@pytest.mark.parametrize("blur", [1e-6, 1e-3, 0.18])
+@pytest.mark.parametrize("roughness", ROUGHNESSES)
+def test_a_blurred_distribution_keeps_its_integral_and_its_tails(gpu: Gpu, roughness: float, blur: float) -> None:
+    """Both of its parts integrate to one; ten widths off the normal it is GGX, but for 2 % by the core's width."""
+    log_angle = np.linspace(np.log(1e-8), np.log(np.pi / 2), 4000)
+    angle = np.exp(log_angle)
+    surface, half = _seen_edge_on(roughness, angle)
+    blurred = BrdfHarness(gpu, "preview-surface", blur).distribution(surface, half)
+    integrand = 2.0 * np.pi * blurred * np.cos(angle) * np.sin(angle) * angle
+    assert np.trapezoid(integrand, log_angle) == pytest.approx(1.0, abs=1e-3)
+    alpha_squared = alpha_from_roughness(np.array(roughness)) ** 2
+    assert blurred[0] == pytest.approx(1.0 / (np.pi * (alpha_squared + blur)), rel=1e-3)
+    far = np.tan(angle) > 10.0 * np.sqrt(alpha_squared + blur)
+    np.testing.assert_allclose(blurred[far], _float64_distribution(surface, half)[far], rtol=0.025)
+
+
 def test_reflection_is_reciprocal(model: Model) -> None:
     surface = _random_surface(20000, seed=1, roughness=(0.0, 1.0))
     light = _around(np.random.default_rng(2), surface.normal)

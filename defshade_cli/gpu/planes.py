@@ -197,6 +197,7 @@ def read_source(planes: Sequence[Plane], layout: Layout) -> str:
             "",
             "Surface read_planes(ivec2 pixel) {",
             "    Surface s;",
+            "    s.blur = 0.0;",
             "    vec4 t;",
             *body,
             "    return s;",

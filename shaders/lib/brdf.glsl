@@ -13,6 +13,30 @@ float D_GGX(float alpha, float NoH, vec3 n, vec3 h) {
     return k * k * (1.0 / PI);
 }
 
+#ifdef PATCHES
+float blurred_alpha(float alpha, float blur) {
+    return min(sqrt(alpha * alpha + blur), 1.0);
+}
+
+// GGX after a Gaussian that adds `blur` to alpha²: the core widens, the tails stay, which a wider GGX would raise. Over slopes,
+// alpha² / w of it is GGX of w = alpha² + blur and the rest Beckmann of w, each of integral 1.
+float D_blurred(float alpha, float blur, float NoH, vec3 n, vec3 h) {
+    float w = alpha * alpha + blur;
+    vec3 nxh = cross(n, h);
+    float cos2 = max(NoH * NoH, 1e-3);
+    float beckmann = exp(-dot(nxh, nxh) / (cos2 * w)) / (PI * cos2 * cos2 * w);
+    return mix(beckmann, D_GGX(sqrt(w), NoH, n, h), alpha * alpha / w);
+}
+#else
+float blurred_alpha(float alpha, float blur) {
+    return alpha;
+}
+
+float D_blurred(float alpha, float blur, float NoH, vec3 n, vec3 h) {
+    return D_GGX(alpha, NoH, n, h);
+}
+#endif
+
 // Heitz 2014, "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", G2 / (4 NoL NoV).
 float V_SmithGGXCorrelated(float NoV, float NoL, float alpha) {
     float a2 = alpha * alpha;

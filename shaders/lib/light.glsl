@@ -56,14 +56,15 @@ float profile(Light light, vec3 emission_direction) {
 }
 
 // How much alpha² grows where a point of the light stands for its whole patch, a disc of solid angle w: half vectors then
-// spread by w / 16π a tangent axis, and GGX's alpha² counts such a variance twice, as in Tokuyoshi & Kaplanyan 2019,
-// "Improved Geometric Specular Antialiasing". Patches shrink with the number of samples, so the mean still converges.
+// spread by w / 16π a tangent axis. Points that are strewn evenly err least by twice that variance, and alpha² counts it twice,
+// as in Tokuyoshi & Kaplanyan 2019, "Improved Geometric Specular Antialiasing". Patches shrink with the number of samples, so
+// the mean still converges.
 float patch_alpha_squared(Light light, vec3 position, vec3 l) {
     if (light.extent == 0.0) return 0.0;
     vec3 to_light = light.position - position;
     float solid_angle = light.extent;
     if (!is_distant(light)) solid_angle *= profile(light, -l) / dot(to_light, to_light);
-    return solid_angle / (8.0 * PI);
+    return solid_angle / (4.0 * PI);
 }
 
 // Light from `light` at a relative position: the unit vector towards it, and the irradiance on a surface facing it.

@@ -24,16 +24,17 @@ float turn_at(Surface s, ivec2 pixel) {
 #endif
 }
 
-// How much alpha² grows where a sample stands for its share of a pixel in which the normal turns: Tokuyoshi & Kaplanyan
-// 2019, "Improved Geometric Specular Antialiasing", 2 sigma² = 1 / pi and at most 0.18. Shares shrink with the number of
-// samples, so the mean still converges; without, single samples would hit highlights that are smaller than a pixel.
+// How much alpha² grows where a sample stands for its share of a pixel in which the normal turns: twice the variance of a
+// square of the pixel that is as large, twice as alpha² counts it, and at most 0.18 (Tokuyoshi & Kaplanyan 2019, "Improved
+// Geometric Specular Antialiasing"). Shares shrink with the number of samples, so the mean still converges; without, single
+// samples would hit highlights that are smaller than a pixel.
 float pixel_alpha_squared(Surface s, ivec2 pixel) {
     float sharpest = s.roughness;
 #ifdef PLANE_CLEARCOAT
     if (s.clearcoat > 0.0) sharpest = min(sharpest, s.clearcoat_roughness);
 #endif
     if (view.pixel_share == 0.0 || sharpest > 0.35) return 0.0;
-    return view.pixel_share * min(turn_at(s, pixel) / PI, 0.18);
+    return view.pixel_share * min(turn_at(s, pixel) / 6.0, 0.18);
 }
 #else
 float pixel_alpha_squared(Surface s, ivec2 pixel) {
@@ -68,8 +69,8 @@ bool is_lit_by(Light light, Surface surface) {
 #endif
 }
 
-// What `irradiance` along `l` adds to a surface seen from `v`, before exposure; widening: of the pixel.
-Lit lit_by(Light light, vec3 l, vec3 irradiance, Surface surface, vec3 position, vec3 v, float widening) {
+// What `irradiance` along `l` adds to a surface seen from `v`, before exposure; blur: of the pixel.
+Lit lit_by(Light light, vec3 l, vec3 irradiance, Surface surface, vec3 position, vec3 v, float blur) {
     Lit lit;
     lit.sent = dot(irradiance, vec3(1.0)) * max(dot(surface.normal, l), 0.0);
     lit.volumes = 1.0;
@@ -82,14 +83,11 @@ Lit lit_by(Light light, vec3 l, vec3 irradiance, Surface surface, vec3 position,
 #endif
     vec3 response = lobe_response(light, surface);
 #ifdef PATCHES
+    surface.blur = blur;
 #ifdef SKY_RAYS
     if (light.is_sky == 0u)
 #endif
-    widening += patch_alpha_squared(light, position, l);
-    if (widening > 0.0) {
-        surface.roughness = widened_roughness(surface.roughness, widening);
-        surface.clearcoat_roughness = widened_roughness(surface.clearcoat_roughness, widening);
-    }
+    surface.blur += patch_alpha_squared(light, position, l);
 #endif
 #ifdef SKY_RAYS
     if (light.is_sky != 0u) response.yz *= share_beside_rays(surface, v, l, light.extent);

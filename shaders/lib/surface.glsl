@@ -11,6 +11,7 @@ struct Surface {
     vec3 f90;
     float clearcoat;
     float clearcoat_roughness;
+    float blur;                // of lobes, in alpha²: by what one sample stands for
 #ifdef PLANE_LINKS
     uint link_set;
 #endif
@@ -41,12 +42,6 @@ float sharpness(float roughness, float sky_share) {
     return 1.0 - smoothstep(0.25 * narrowest, 0.45 * narrowest, roughness);
 }
 
-// A lobe that is wider by the patch of light that one point stands for.
-float widened_roughness(float roughness, float alpha_squared) {
-    float alpha = GGX_alpha(roughness);
-    return sqrt(min(sqrt(alpha * alpha + alpha_squared), 1.0));
-}
-
 // The part of the light along a direction that the lobes leave to what lies below them, at most.
 float left_by_lobes(Surface s, float NoV) {
     vec3 E = E_bound(s.f0, s.f90, NoV, GGX_alpha(s.roughness), SMITH_GGX);
@@ -67,6 +62,12 @@ Angles angles_between(vec3 n, vec3 v, vec3 l, vec3 h) {
     return Angles(max(dot(n, v), MIN_NOV), dot(n, l), dot(n, h), dot(v, h));
 }
 
+// D G2 / (4 NoL NoV), in the sample's blur.
+float lobe(float alpha, Surface s, Angles a, vec3 h) {
+    float D = D_blurred(alpha, s.blur, a.NoH, s.normal, h);
+    return D * V_SmithGGXCorrelated(a.NoV, a.NoL, blurred_alpha(alpha, s.blur));
+}
+
 // UsdPreviewSurface as its schema describes it, but that no lobe leaves more light below it than it has not taken:
 // docs/lighting.md. `response` scales the diffuse, the specular and the coat's lobe.
 vec3 brdf_preview_surface(Surface s, Angles a, vec3 h, vec3 response) {
@@ -75,13 +76,13 @@ vec3 brdf_preview_surface(Surface s, Angles a, vec3 h, vec3 response) {
     float mu = min(a.NoV, a.NoL);
     vec3 taken = max(F, E_bound(s.f0, s.f90, mu, alpha, SMITH_GGX));
     vec3 diffuse = s.base * ((1.0 - s.metallic) / PI) * (1.0 - taken);
-    vec3 specular = D_GGX(alpha, a.NoH, s.normal, h) * V_SmithGGXCorrelated(a.NoV, a.NoL, alpha) * F;
+    vec3 specular = lobe(alpha, s, a, h) * F;
     vec3 result = diffuse * response.x + specular * response.y;
 #ifdef PLANE_CLEARCOAT
     float coat_alpha = GGX_alpha(s.clearcoat_roughness);
     float coat_F = F_Schlick(vec3(DEFAULT_F0), vec3(1.0), a.VoH).x;
     float coat_taken = max(coat_F, E_bound(vec3(DEFAULT_F0), vec3(1.0), mu, coat_alpha, SMITH_GGX).x);
-    float coat = D_GGX(coat_alpha, a.NoH, s.normal, h) * V_SmithGGXCorrelated(a.NoV, a.NoL, coat_alpha) * coat_F;
+    float coat = lobe(coat_alpha, s, a, h) * coat_F;
     result = result * (1.0 - s.clearcoat * coat_taken) + s.clearcoat * coat * response.z;
 #endif
     return result;
@@ -93,7 +94,8 @@ vec3 brdf_classic(Surface s, Angles a, vec3 h, vec3 response) {
     vec3 real_albedo = s.base - s.base * s.metallic;
     vec3 real_specular = mix(vec3(0.03), s.base, s.metallic);
     vec3 F = F_Schlick(real_specular, vec3(1.0), a.VoH);
-    vec3 specular = D_GGX(alpha, a.NoH, s.normal, h) * V_SmithSchlick(a.NoV, a.NoL, alpha) * F;
+    float D = D_blurred(alpha, s.blur, a.NoH, s.normal, h);
+    vec3 specular = D * V_SmithSchlick(a.NoV, a.NoL, blurred_alpha(alpha, s.blur)) * F;
     vec3 taken = max(specular, E_bound(real_specular, vec3(1.0), min(a.NoV, a.NoL), alpha, SMITH_SCHLICK));
     return real_albedo / PI * max(1.0 - taken, 0.0) * response.x + specular * response.y;
 }
