@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import pairwise
+from itertools import compress, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -51,15 +51,17 @@ class Shaped(NamedTuple):
 def shape_all(meshes: Iterable[Polygons]) -> dict[Polygons, Shaped]:
     """Those of `meshes` that are small."""
     alike: dict[tuple[str, bool, bool], list[Polygons]] = defaultdict(list)
-    for mesh in dict.fromkeys(meshes):
-        if _is_small(mesh):
-            alike[mesh.scheme, mesh.left_handed, mesh.normals is None].append(mesh)
+    for mesh in _small(dict.fromkeys(meshes)):
+        alike[mesh.scheme, mesh.left_handed, mesh.normals is None].append(mesh)
     blocks = (block for group in alike.values() for block in _blocks(group))
     return {mesh: shaped for block in blocks for mesh, shaped in zip(block, _shape(block), strict=True)}
 
 
-def _is_small(mesh: Polygons) -> bool:
-    return 0 < len(mesh.indices) <= _LARGEST and not len(mesh.holes) and int(mesh.counts.max()) <= _MOST_CORNERS
+def _small(meshes: Iterable[Polygons]) -> Iterator[Polygons]:
+    few = [mesh for mesh in meshes if 0 < len(mesh.indices) <= _LARGEST and not len(mesh.holes)]
+    if few:
+        most = np.maximum.reduceat(np.concatenate([mesh.counts for mesh in few]), _ends(few, "counts")[:-1])
+        yield from compress(few, most <= _MOST_CORNERS)
 
 
 def _blocks(meshes: Sequence[Polygons]) -> Iterator[Sequence[Polygons]]:
