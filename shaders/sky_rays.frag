@@ -9,6 +9,7 @@
 uniform sampler2D sky_density;     // of all directions that stand for the sky in all samples, by solid angle
 uniform vec2 response;             // of the diffuse and of the specular lobe
 uniform float cell_lod;            // of the sky, whose texels are as large as the cells that directions are drawn from
+uniform float tree_rounding;       // of where its triangles are
 uniform uint rays;                 // of a pixel in this sample
 #ifdef PLANE_LINKS
 uniform uint first_link;
@@ -51,7 +52,7 @@ vec3 sky_by_rays(Surface s, vec3 position, vec3 v, uvec2 pixel) {
     float share = ray_share(s, v);
     vec3 total = vec3(0.0);
     if (share == 0.0) return total;
-    vec3 above = position + s.normal * (RAY_OFFSET * length(position));
+    vec3 above = position + s.normal * (RAY_OFFSET * length(position) + tree_rounding);
     for (uint i = 0u; i < rays; ++i) {
         vec3 l = ray_direction(s, v, owen_sobol(view.sample_index * rays + i, uvec4(pixel, 0x5eu, 0u)));
         if (dot(s.normal, l) <= 0.0) continue;

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from build import quad, scene, sphere
+from build import camera, quad, scene, sphere
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.passes.sky_rays import in_texels
@@ -119,3 +119,12 @@ def test_rays_are_left_to_directions_where_they_would_not_know_enough() -> None:
     linked = replace(DOME, links=Links(np.array([True]), np.array([False])))
     assert planned(scene([quad()], [linked], [GLOSSY])).sky_rays == 0
     assert planned(replace(solid, lights=())).sky_rays == 0
+
+
+@pytest.mark.parametrize("far", [0.0, 1e8 / 3.0])
+def test_a_floor_does_not_hide_the_sky_from_itself(pipeline: Pipeline, far: float) -> None:
+    """However far away something else is, which the tree's triangles are rounded by."""
+    metal = replace(GLOSSY, diffuse_color=(1.0, 1.0, 1.0), metallic=1.0, clearcoat=0.0)
+    of = scene([quad(3.0), *[quad(1.0, -far)] * bool(far)], [DOME], [metal], camera(4.9))
+    image = pipeline.render(of, planned(of, 4)).layers["beauty"]
+    assert image[..., :3].mean() > 0.95

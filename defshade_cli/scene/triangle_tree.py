@@ -36,6 +36,11 @@ class TriangleTree:
         return len(self.boxes) // 2
 
     @property
+    def rounding(self) -> float:
+        """What float32 may move a triangle by, and some more."""
+        return 4.0 * float(np.abs(self.boxes[1]).max()) * float(np.finfo(np.float32).eps)
+
+    @property
     def leaf_size(self) -> int:
         """Triangles of each."""
         return len(self.corners) // self.leaves
