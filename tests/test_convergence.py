@@ -160,7 +160,7 @@ def test_what_ended_the_render_is_said(pipeline: Pipeline) -> None:
     short = facts(max_error=1e-5, samples=24)
     assert (short["stopped_by"], short["samples"]) == ("samples", 24)
     assert facts(time_limit=1e-9)["stopped_by"] == "time-limit"
-    assert facts(samples=1)["error"] is None
+    assert facts(samples=1)["error"] is None and facts(samples=1, max_error=0.5)["samples"] == 1
 
 
 def test_the_most_samples_without_a_number() -> None:

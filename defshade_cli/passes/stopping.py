@@ -42,9 +42,9 @@ class Stopping:
         """Was that the last sample? Not by their number: `samples` ends by itself."""
         if self._plan.tracks_error:
             self._batches.note(accumulation)
-        if self._plan.max_error is not None and self._batches.are_complete and accumulation.count >= FEWEST:
-            self._judge(accumulation.count)
-            self._narrow()
+            if self._plan.max_error is not None and self._batches.are_complete and accumulation.count >= FEWEST:
+                self._judge(accumulation.count)
+                self._narrow()
         if self._convergence.has_arrived:
             self._stopped_by = "max-error"
         elif self._is_late():
