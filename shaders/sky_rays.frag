@@ -37,7 +37,7 @@ vec3 ray_direction(Surface s, vec3 v, vec2 u) {
     roughness = on_coat ? s.clearcoat_roughness : s.roughness;
     u.y = on_coat ? u.y / coat : (u.y - coat) / max(1.0 - coat, 1e-6);
 #endif
-    return reflect(-v, visible_normal(v, s.normal, blurred_alpha(GGX_alpha(roughness), s.blur), u));
+    return reflect(-v, visible_normal(v, s.normal, GGX_alpha(roughness), u));
 }
 
 // The sky along `l`, as blurred as the part of it that one of `density` directions stands for, but within the cells in which
@@ -74,7 +74,6 @@ void main() {
 #ifdef PLANE_LINKS
     if (!is_linked(first_link, s.link_set)) discard;
 #endif
-    s.blur = pixel_alpha_squared(s, pixel);
     vec3 position = position_at(gl_FragCoord.xy, camera_depth(stored));
     vec3 light = sky_by_rays(s, position, direction_to_eye(position), uvec2(pixel) + uvec2(view.origin));
     write_light(exposed(Lit(light, vec3(0.0), 0.0, 0.0, 0.0)));

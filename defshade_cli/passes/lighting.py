@@ -67,7 +67,7 @@ class LightingVariant:
         chosen = plan.lights if chosen is None else chosen
         orthographic = plan.camera.projection == "orthographic"
         lights = [planned.light for planned in chosen]
-        patches = plan.samples > 1 or any(planned.points > 1 for planned in chosen)
+        patches = plan.pixel_share > 0.0
         return cls(
             plan.planes,
             plan.layout,

@@ -35,7 +35,7 @@ def view_record(plan: Plan, layout: Layout, sample: Sample = CENTRE) -> NDArray[
     view["sample_index"] = sample.index
     view["sky_share"] = plan.sky_share
     view["sky_rays"] = plan.sky_rays * plan.samples
-    view["pixel_share"] = 1.0 / plan.samples if plan.samples > 1 else 0.0
+    view["pixel_share"] = plan.pixel_share
     return view
 
 

@@ -20,6 +20,7 @@ from defshade_cli.plan.groups import light_groups, light_outputs
 from defshade_cli.plan.lights import PlannedLight, plan_lights
 from defshade_cli.plan.moments import count_moments, share_moments
 from defshade_cli.plan.opacity import is_transparent, thin_materials, thin_numbers
+from defshade_cli.plan.points import pixel_share
 from defshade_cli.plan.shadow_maps import count_maps, shadow_resolution
 from defshade_cli.plan.sky_rays import count_sky_rays
 from defshade_cli.plan.texels import seen_texels
@@ -48,7 +49,8 @@ class Plan:
     clip: (near, far), the camera's range tightened to the geometry.
     render_space: of light and reflectance.
     exposure: linear, the camera's and the settings' together.
-    samples: a pixel at most.  max_error, time_limit: of RenderSettings.  filter_width: pixels.
+    samples: a pixel at most.  pixel_share: see plan/points.py.  max_error, time_limit: of RenderSettings.
+    filter_width: pixels.
     moments: of the shutter that the samples see, in turn; 0 without motion blur.
     planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
     lights: sorted quads, spheres, cones.  lighting: how they are drawn, volumes or tiles.
@@ -74,6 +76,7 @@ class Plan:
     layout: Layout
     shading: Shading
     samples: int
+    pixel_share: float
     max_error: float | None
     time_limit: float | None
     moments: int
@@ -252,6 +255,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         layout=settings.layout,
         shading=settings.shading,
         samples=settings.most_samples,
+        pixel_share=pixel_share(settings),
         max_error=settings.max_error,
         time_limit=settings.time_limit,
         moments=count_moments(scene, settings),

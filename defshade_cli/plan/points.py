@@ -31,9 +31,14 @@ def points_of(light: Light, shared: int, settings: RenderSettings) -> int:
     """A sample's points of a light, `shared` among most; of a dome directions, 0 where its analytic term does."""
     if not isinstance(light, DomeLight):
         return shared
-    if settings.most_samples * settings.light_points == 1:
+    if pixel_share(settings) == 0.0:
         return 0
     return max(_power_of_two(_FOR_EACH_POINT * settings.light_points / settings.most_samples), _SKY_DIRECTIONS)
+
+
+def pixel_share(settings: RenderSettings) -> float:
+    """Of a pixel, what a sample's highlights stand for; 0 for one sample of points of light: the plain equation."""
+    return 0.0 if settings.most_samples * settings.light_points == 1 else 1.0 / settings.most_samples
 
 
 def rays_a_sample(settings: RenderSettings) -> int:

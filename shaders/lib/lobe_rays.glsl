@@ -22,8 +22,7 @@ float ray_share(Surface s, vec3 v) {
 }
 
 // Heitz 2018, "Sampling the GGX Distribution of Visible Normals", eq. 17: G1 D / (4 NoV) by solid angle of the light.
-float visible_normals_density(float roughness, float blur, float NoV, float NoH, vec3 n, vec3 h) {
-    float alpha = blurred_alpha(GGX_alpha(roughness), blur);
+float visible_normals_density(float alpha, float NoV, float NoH, vec3 n, vec3 h) {
     float a2 = alpha * alpha;
     return 0.5 * D_GGX(alpha, NoH, n, h) / (NoV + sqrt(a2 + (1.0 - a2) * NoV * NoV));
 }
@@ -32,9 +31,9 @@ float visible_normals_density(float roughness, float blur, float NoV, float NoH,
 float ray_density(Surface s, vec3 v, vec3 l) {
     vec3 h = normalize(v + l);
     float NoV = dot(s.normal, v), NoH = dot(s.normal, h);
-    float density = visible_normals_density(s.roughness, s.blur, NoV, NoH, s.normal, h);
+    float density = visible_normals_density(GGX_alpha(s.roughness), NoV, NoH, s.normal, h);
 #ifdef PLANE_CLEARCOAT
-    float coat = visible_normals_density(s.clearcoat_roughness, s.blur, NoV, NoH, s.normal, h);
+    float coat = visible_normals_density(GGX_alpha(s.clearcoat_roughness), NoV, NoH, s.normal, h);
     density = mix(density, coat, coat_rays(s, NoV));
 #endif
     return density;

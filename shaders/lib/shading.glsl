@@ -83,14 +83,13 @@ Lit lit_by(Light light, vec3 l, vec3 irradiance, Surface surface, vec3 position,
 #endif
     vec3 response = lobe_response(light, surface);
 #ifdef PATCHES
-    surface.blur = blur;
-#ifdef SKY_RAYS
-    if (light.is_sky == 0u)
-#endif
-    surface.blur += patch_alpha_squared(light, position, l);
+    surface.blur = blur + patch_alpha_squared(light, position, l);
 #endif
 #ifdef SKY_RAYS
-    if (light.is_sky != 0u) response.yz *= share_beside_rays(surface, v, l, light.extent);
+    if (light.is_sky != 0u) {
+        surface.blur = 0.0;    // a pixel's own rays are strewn as wide as its lobes
+        response.yz *= share_beside_rays(surface, v, l, light.extent);
+    }
 #endif
     vec3 arriving = render_from_rec709(irradiance);
     lit.radiance = arriving * evaluate_brdf(surface, v, l, response);
