@@ -37,8 +37,14 @@ def points_of(light: Light, shared: int, settings: RenderSettings) -> int:
 
 
 def pixel_share(settings: RenderSettings) -> float:
-    """Of a pixel, what a sample's highlights stand for; 0 for one sample of points of light: the plain equation."""
-    return 0.0 if settings.most_samples * settings.light_points == 1 else 1.0 / settings.most_samples
+    """Of a pixel, what a sample's highlights stand for; 0 for one sample of points of light: the plain equation.
+
+    Half of it for one sample: shares are blurred by twice their variance, which suits strewn samples, not one at the
+    pixel's centre.
+    """
+    if settings.most_samples > 1:
+        return 1.0 / settings.most_samples
+    return 0.5 if settings.light_points > 1 else 0.0
 
 
 def rays_a_sample(settings: RenderSettings) -> int:
