@@ -21,11 +21,7 @@ void main() {
     float stored = texelFetch(plane_depth, pixel, 0).x;
     if (stored == BACKGROUND_DEPTH) discard;
     Surface s = read_planes(pixel);
-    float sharpest = s.roughness;
-#ifdef PLANE_CLEARCOAT
-    if (s.clearcoat > 0.0) sharpest = min(sharpest, s.clearcoat_roughness);
-#endif
-    if (sharpness(sharpest, view.sky_share) == 0.0) discard;
+    if (sharpness(sharpest_roughness(s), view.sky_share) == 0.0) discard;
     vec3 position = position_at(gl_FragCoord.xy, camera_depth(stored));
     vec3 l;
     vec3 irradiance = irradiance_from(light, position, l);

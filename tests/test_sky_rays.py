@@ -76,9 +76,7 @@ def met(gpu: Gpu, tree: TriangleTree, rays: NDArray[np.float64]) -> NDArray[np.b
     """(R,) what lib/rays.glsl says of rays (R, 2, 3), origins from the tree's centre."""
     program = gpu.shaders.compute("rays_probe.comp", [], {"rays_probe.comp": _PROBE})
     program["tree_shape"], program["tree_from_relative"] = (tree.leaves, tree.leaf_size), (0.0, 0.0, 0.0)
-    first, second, third = np.moveaxis(tree.corners, 1, 0)
-    edges = np.stack([first, second - first, third - first], axis=1)
-    buffers = {0: in_texels(rays.astype(np.float32)), 9: in_texels(tree.boxes), 10: in_texels(edges)}
+    buffers = {0: in_texels(rays.astype(np.float32)), 9: in_texels(tree.boxes), 10: in_texels(tree.edges)}
     kept = [gpu.context.buffer(rows.tobytes()) for rows in buffers.values()]
     results = gpu.context.buffer(reserve=4 * len(rays))
     for binding, buffer in zip([*buffers, 1], [*kept, results], strict=True):

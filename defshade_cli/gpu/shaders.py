@@ -116,6 +116,13 @@ class ShaderLibrary:
         return self._compute[source.text,]
 
 
+def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> None:
+    """Those that the program reads; a variant may do without some."""
+    for name, value in values.items():
+        if name in program:
+            program[name] = value
+
+
 def _readable(message: str, sources: list[Source]) -> str:
     """moderngl heads its message with the stage that failed; that stage's source names the lines."""
     stages = {_STAGES.get(source.name.rpartition(".")[2], ""): source for source in sources}

@@ -9,14 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import moderngl
-
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.outputs import output_defines, outputs_source
 from defshade_cli.gpu.planes import Plane, read_source
 from defshade_cli.gpu.render_space import space_defines
-from defshade_cli.image.environment import sky_of
 from defshade_cli.image.render_space import REC709, RenderSpace
+from defshade_cli.passes.dome_program import DomeProgram
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.linking import ALL_LINKED
@@ -24,10 +22,7 @@ from defshade_cli.passes.screen import Screen
 from defshade_cli.passes.sky_textures import SkyTextures
 from defshade_cli.passes.sky_visibility import SkyVisibility
 from defshade_cli.plan import Plan, PlannedLight
-from defshade_cli.scene.environment import Environment
-from defshade_cli.scene.light import DomeLight
 from defshade_cli.settings import Layout
-from defshade_cli.spaces import rigid
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,14 +65,11 @@ class EnvironmentPass:
     """Compiled for one variant."""
 
     def __init__(self, gpu: Gpu, variant: EnvironmentVariant, screen: Screen, textures: SkyTextures) -> None:
-        self._context, self._textures = gpu.context, textures
         generated = {
             "generated/planes.glsl": read_source(variant.planes, variant.layout),
             "generated/outputs.glsl": outputs_source(variant.outputs, variant.groups),
         }
-        files = ("screen.vert", "environment.frag")
-        self._program = gpu.shaders.program(*files, defines=variant.defines, generated=generated)
-        self._screen, self._array = screen, screen.array(self._program)
+        self._dome = DomeProgram(gpu, "environment.frag", variant.defines, generated, screen, textures)
 
     def draw(
         self,
@@ -88,25 +80,5 @@ class EnvironmentPass:
         first_link: int = ALL_LINKED,
     ) -> None:
         """Add a dome to the targets. visibility: of skies, where some are hidden.  first_link: place of its bits."""
-        dome = planned.light
-        assert isinstance(dome, DomeLight)
-        targets.of(planned.groups).use()
-        self._context.enable_only(moderngl.BLEND)
-        self._context.blend_func = moderngl.ONE, moderngl.ONE
-        sky = sky_of(dome)
-        gbuffer.bind(self._program, sky=self._textures.image(sky), **(visibility.textures if visibility else {}))
-        for name, value in {**dome_uniforms(dome, sky), "first_link": first_link}.items():
-            if name in self._program:
-                self._program[name] = value
-        self._screen.draw(self._array)
-
-
-def dome_uniforms(dome: DomeLight, sky: Environment) -> dict[str, object]:
-    """What shaders/lib/environment.glsl reads, and the response."""
-    rotation = rigid(dome.world_from_light)[:3, :3]
-    return {
-        "sky_from_relative": tuple(rotation.ravel()),  # the transpose of a rotation, column by column
-        "sky_emission": tuple(dome.emission),
-        "irradiance_sh": [tuple(row) for row in sky.irradiance_sh],
-        "response": (dome.diffuse, dome.specular),
-    }
+        textures = visibility.textures if visibility else {}
+        self._dome.add(planned, gbuffer, targets, {"first_link": first_link}, textures)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.gpu.records import block_source, record
 from defshade_cli.gpu.residence import SHADOW_BLOCK
+from defshade_cli.gpu.shaders import set_uniforms
 from defshade_cli.passes.view import clip_from_camera, depth_coefficients
 from defshade_cli.plan.shadow_maps import CUBE_FACES
 from defshade_cli.scene.camera import Camera
@@ -80,9 +81,7 @@ class ShadowAtlas:
 
     def bind(self, program: moderngl.Program) -> moderngl.Texture:
         """Let `program` find texels; returns what holds them."""
-        for name, value in self.uniforms.items():
-            if name in program:
-                program[name] = value
+        set_uniforms(program, self.uniforms)
         return self.depth
 
 

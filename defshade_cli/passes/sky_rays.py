@@ -18,7 +18,7 @@ from defshade_cli.gpu.outputs import outputs_source
 from defshade_cli.gpu.planes import read_source
 from defshade_cli.gpu.residence import BOXES, TRIANGLES, RecordBuffer
 from defshade_cli.image.environment import sky_of
-from defshade_cli.passes.environment import dome_uniforms
+from defshade_cli.passes.dome_program import DomeProgram
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.lighting import LightingVariant
@@ -46,8 +46,7 @@ class TreeStore:
         if self._tree is None or self._scene is None or not _is_placed_alike(self._scene, scene):
             self._tree = triangle_tree(scene)
             self._boxes.write(in_texels(self._tree.boxes))
-            first, second, third = np.moveaxis(self._tree.corners, 1, 0)
-            self._triangles.write(in_texels(np.stack([first, second - first, third - first], axis=1)))
+            self._triangles.write(in_texels(self._tree.edges))
         self._scene = scene
         return self._tree
 
@@ -93,7 +92,6 @@ class SkyRaysPass:
     def __init__(
         self, gpu: Gpu, variant: LightingVariant, screen: Screen, textures: SkyTextures, *, hidden: bool
     ) -> None:
-        self._context, self._screen, self._textures = gpu.context, screen, textures
         variant = replace(variant, shadows=(), shadow_styles=False, ies=False, shaped=False)
         generated = {
             "generated/planes.glsl": read_source(variant.planes, variant.layout),
@@ -101,8 +99,7 @@ class SkyRaysPass:
             **shadow_source(variant.shadows),
         }
         defines = [*variant.defines, "VOLUME_QUAD", *["HIDDEN_SKY"] * hidden]
-        self._program = gpu.shaders.program("screen.vert", "sky_rays.frag", defines=defines, generated=generated)
-        self._array = screen.array(self._program)
+        self._dome = DomeProgram(gpu, "sky_rays.frag", defines, generated, screen, textures)
 
     def draw(
         self,
@@ -114,24 +111,10 @@ class SkyRaysPass:
         first_link: int = ALL_LINKED,
     ) -> None:
         """Add what a dome shows in lobes. first_link: place of its bits."""
-        dome = planned.light
-        assert isinstance(dome, DomeLight)
-        targets.of(planned.groups).use()
-        self._context.enable_only(moderngl.BLEND)
-        self._context.blend_func = moderngl.ONE, moderngl.ONE
-        sky = sky_of(dome)
-        gbuffer.bind(self._program, sky=self._textures.image(sky), sky_density=rays.densities[dome])
-        uniforms = {
-            **dome_uniforms(dome, sky),
-            "first_link": first_link,
-            "rays": plan.sky_rays,
-            "cell_lod": sky.cell_level,
-        }
+        uniforms: dict[str, object] = {"first_link": first_link, "rays": plan.sky_rays}
         if rays.tree:
             uniforms["tree_rounding"] = rays.tree.rounding
             uniforms["tree_shape"] = rays.tree.leaves, rays.tree.leaf_size
             uniforms["tree_from_relative"] = tuple(plan.camera.position - rays.tree.centre)
-        for name, value in uniforms.items():
-            if name in self._program:
-                self._program[name] = value
-        self._screen.draw(self._array)
+        assert isinstance(planned.light, DomeLight)
+        self._dome.add(planned, gbuffer, targets, uniforms, {"sky_density": rays.densities[planned.light]})

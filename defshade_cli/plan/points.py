@@ -31,20 +31,25 @@ def points_of(light: Light, shared: int, settings: RenderSettings) -> int:
     """A sample's points of a light, `shared` among most; of a dome directions, 0 where its analytic term does."""
     if not isinstance(light, DomeLight):
         return shared
-    if pixel_share(settings) == 0.0:
+    if _is_plain(settings):
         return 0
     return max(_power_of_two(_FOR_EACH_POINT * settings.light_points / settings.most_samples), _SKY_DIRECTIONS)
 
 
 def pixel_share(settings: RenderSettings) -> float:
-    """Of a pixel, what a sample's highlights stand for; 0 for one sample of points of light: the plain equation.
+    """Of a pixel, what a sample's highlights stand for; 0 for the plain equation.
 
     Half of it for one sample: shares are blurred by twice their variance, which suits strewn samples, not one at the
     pixel's centre.
     """
-    if settings.most_samples > 1:
-        return 1.0 / settings.most_samples
-    return 0.5 if settings.light_points > 1 else 0.0
+    if _is_plain(settings):
+        return 0.0
+    return 1.0 / max(settings.most_samples, 2)
+
+
+def _is_plain(settings: RenderSettings) -> bool:
+    """One sample, to which every light is a point?"""
+    return settings.most_samples * settings.light_points == 1
 
 
 def rays_a_sample(settings: RenderSettings) -> int:

@@ -41,6 +41,12 @@ class TriangleTree:
         return 4.0 * float(np.abs(self.boxes[1]).max()) * float(np.finfo(np.float32).eps)
 
     @property
+    def edges(self) -> NDArray[np.float32]:
+        """(L · K, 3, 3): of each triangle a corner, and from there the other two."""
+        first, second, third = np.moveaxis(self.corners, 1, 0)
+        return np.stack([first, second - first, third - first], axis=1)
+
+    @property
     def leaf_size(self) -> int:
         """Triangles of each."""
         return len(self.corners) // self.leaves

@@ -21,16 +21,16 @@ uint laine_karras(uint x, uint key) {
     return x ^ x * 0x8d22f6e6u;
 }
 
+uint owen_scrambled(uint bits, uint key) {
+    return bitfieldReverse(laine_karras(bitfieldReverse(bits), key));
+}
+
 // Number `index` of the seed's own sequence in [0, 1), 24 bits, stratified at every power of two: Burley 2020,
 // "Practical Hash-based Owen Scrambling", JCGT 9(4). Sequences of different seeds know nothing of each other.
 float owen_van_der_corput(uint index, uvec4 seed) {
     uvec4 keys = pcg4d(seed);
-    uint shuffled = bitfieldReverse(laine_karras(bitfieldReverse(index), keys.x));
-    return float(bitfieldReverse(laine_karras(shuffled, keys.y)) >> 8u) * (1.0 / 16777216.0);
-}
-
-uint owen_scrambled(uint bits, uint key) {
-    return bitfieldReverse(laine_karras(bitfieldReverse(bits), key));
+    uint shuffled = owen_scrambled(index, keys.x);
+    return float(owen_scrambled(bitfieldReverse(shuffled), keys.y) >> 8u) * (1.0 / 16777216.0);
 }
 
 // Point `index` of the seed's own Owen-scrambled (0, 2)-sequence, as passes/sampling.py has it.

@@ -14,11 +14,7 @@ float coat_rays(Surface s, float NoV) {
 // Of a pixel's samples, the share that sends rays: lobes as wide as these find the sky by the directions that pixels share.
 float ray_share(Surface s, vec3 v) {
     if (dot(s.normal, v) < MIN_NOV) return 0.0;
-    float sharpest = s.roughness;
-#ifdef PLANE_CLEARCOAT
-    if (s.clearcoat > 0.0) sharpest = min(sharpest, s.clearcoat_roughness);
-#endif
-    return 1.0 - smoothstep(0.5, 0.7, sharpest);
+    return 1.0 - smoothstep(0.5, 0.7, sharpest_roughness(s));
 }
 
 // Heitz 2018, "Sampling the GGX Distribution of Visible Normals", eq. 17: G1 D / (4 NoV) by solid angle of the light.

@@ -9,7 +9,7 @@ struct View {
     vec2 origin;               // of the first pixel in the display window
     float exposure;
     uint sample_index;
-    float pixel_share;         // of a pixel, that a sample stands for; 0 in a frame of one sample
+    float pixel_share;         // of a pixel, that a sample's highlights stand for; plan/points.py
     float sky_share;           // of a dome, that four of its directions stand for
     float sky_rays;            // of a pixel, in all samples together
 };

@@ -29,11 +29,7 @@ float turn_at(Surface s, ivec2 pixel) {
 // Geometric Specular Antialiasing"). Shares shrink with the number of samples, so the mean still converges; without, single
 // samples would hit highlights that are smaller than a pixel.
 float pixel_alpha_squared(Surface s, ivec2 pixel) {
-    float sharpest = s.roughness;
-#ifdef PLANE_CLEARCOAT
-    if (s.clearcoat > 0.0) sharpest = min(sharpest, s.clearcoat_roughness);
-#endif
-    if (view.pixel_share == 0.0 || sharpest > 0.35) return 0.0;
+    if (view.pixel_share == 0.0 || sharpest_roughness(s) > 0.35) return 0.0;
     return view.pixel_share * min(turn_at(s, pixel) / 6.0, 0.18);
 }
 #else

@@ -42,6 +42,13 @@ float sharpness(float roughness, float sky_share) {
     return 1.0 - smoothstep(0.25 * narrowest, 0.45 * narrowest, roughness);
 }
 
+float sharpest_roughness(Surface s) {
+#ifdef PLANE_CLEARCOAT
+    if (s.clearcoat > 0.0) return min(s.roughness, s.clearcoat_roughness);
+#endif
+    return s.roughness;
+}
+
 // The part of the light along a direction that the lobes leave to what lies below them, at most.
 float left_by_lobes(Surface s, float NoV) {
     vec3 E = E_bound(s.f0, s.f90, NoV, GGX_alpha(s.roughness), SMITH_GGX);
