@@ -140,7 +140,7 @@ def control_samples(kind: Kind, counts: NDArray[np.int64], points: int, closed: 
     segment = np.minimum(along.astype(np.intp), segments[curve] - 1)
     samples = sample_at(kind, counts, points, Places(curve, segment, along - segment))
     own = (np.cumsum(counts) - counts)[curve] + place
-    vertex = _sparse(np.ones(len(own)), np.arange(len(own)), own, (len(own), points))
+    vertex = sparse_weights(np.ones(len(own)), np.arange(len(own)), own, (len(own), points))
     return replace(samples, vertex=vertex, closed=closed)
 
 
@@ -178,7 +178,7 @@ def _vertex_weights(
     phantom = points + 2 * curve[:, None]
     column = np.where(own < 0, phantom, np.where(own >= counts[curve, None], phantom + 1, column))
     row = np.repeat(np.arange(len(curve)), size)
-    extended = _sparse(weights.ravel(), row, column.ravel(), (len(curve), points + 2 * len(counts)))
+    extended = sparse_weights(weights.ravel(), row, column.ravel(), (len(curve), points + 2 * len(counts)))
     return extended @ _with_phantoms(first, counts, points)
 
 
@@ -191,7 +191,7 @@ def _with_phantoms(first: NDArray[np.int64], counts: NDArray[np.int64], points: 
     column = np.concatenate([np.arange(points), start, start + 1, end, end - 1])
     ones = np.ones(len(curve))
     weight = np.concatenate([np.ones(points), 2 * ones, -ones, 2 * ones, -ones])
-    return _sparse(weight, row, column, (points + 2 * len(counts), points))
+    return sparse_weights(weight, row, column, (points + 2 * len(counts), points))
 
 
 def _varying_weights(kind: Kind, varying_counts: NDArray[np.int64], places: Places) -> Weights:
@@ -202,10 +202,11 @@ def _varying_weights(kind: Kind, varying_counts: NDArray[np.int64], places: Plac
     row = np.tile(np.arange(len(curve)), 2)
     column = np.concatenate([first + segment, first + following])
     weight = np.concatenate([1.0 - t, t])
-    return _sparse(weight, row, column, (len(curve), int(varying_counts.sum())))
+    return sparse_weights(weight, row, column, (len(curve), int(varying_counts.sum())))
 
 
-def _sparse(weight: NDArray[Any], row: NDArray[Any], column: NDArray[Any], shape: tuple[int, int]) -> Weights:
+def sparse_weights(weight: NDArray[Any], row: NDArray[Any], column: NDArray[Any], shape: tuple[int, int]) -> Weights:
+    """A matrix of so many rows and columns from (N,) weights and where each lies."""
     from scipy import sparse
 
     return sparse.csr_array((weight, (row, column)), shape=shape)

@@ -8,8 +8,9 @@ from pxr import Usd, UsdGeom
 
 from defshade_cli.usd.basis import Kind
 from defshade_cli.usd.points import find_widths
+from defshade_cli.usd.polygons import Primvar
 from defshade_cli.usd.positions import read_positions
-from defshade_cli.usd.primvars import DISPLAY_COLOR, Authored, authored, fit, read_carried
+from defshade_cli.usd.primvars import DISPLAY_COLOR, Authored, Elements, authored, fit, read_carried
 from defshade_cli.usd.strands import Strands
 from defshade_cli.usd.values import integers
 
@@ -34,10 +35,8 @@ def read_curves(
     if left_out := np.count_nonzero(kind.segments(counts) == 0):
         issues.append(f"{left_out} curves are left out: they have too few points, or cannot be closed")
     elements = kind.elements(counts, len(points))
-    widths = find_widths(prim, time, elements, issues)
-    if widths is None:
-        issues.append("no widths that fit: its curves are drawn as lines one pixel wide")
-    normals = fit(_normals(curves, time), 3, elements, issues)
+    widths = read_widths(prim, time, elements, issues)
+    normals = fit(read_normals(curves, time), 3, elements, issues)
     carried = read_carried(prim, time, elements, issues, color)
     return Strands(kind, counts, points, widths, normals, carried, loops=as_authored.closed)
 
@@ -67,6 +66,15 @@ def _closable(kind: Kind, counts: NDArray[np.int64], issues: list[str]) -> Kind:
     return as_open
 
 
-def _normals(curves: UsdGeom.BasisCurves, time: Usd.TimeCode) -> Authored | None:
+def read_widths(prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> Primvar | None:
+    """primvars:widths, else widths; None, and said, where the curves become lines."""
+    widths = find_widths(prim, time, elements, issues)
+    if widths is None:
+        issues.append("no widths that fit: its curves are drawn as lines one pixel wide")
+    return widths
+
+
+def read_normals(curves: UsdGeom.Curves, time: Usd.TimeCode) -> Authored | None:
+    """primvars:normals, else normals."""
     primvar = authored(UsdGeom.PrimvarsAPI(curves).GetPrimvar("normals"), time)
     return primvar or Authored("normals", curves.GetNormalsAttr().Get(time), curves.GetNormalsInterpolation())

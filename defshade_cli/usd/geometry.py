@@ -26,6 +26,7 @@ from defshade_cli.usd.gprims import read_solid, size_attributes
 from defshade_cli.usd.mesh import MESH_ATTRIBUTES, read_mesh
 from defshade_cli.usd.normals import with_normals
 from defshade_cli.usd.nurbs import PATCH_ATTRIBUTES, read_patch
+from defshade_cli.usd.nurbs_curves import NURBS_CURVES_ATTRIBUTES, read_nurbs_curves
 from defshade_cli.usd.points import POINTS_ATTRIBUTES, read_points
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.positions import is_carried_by_velocities, read_positions
@@ -247,6 +248,9 @@ def _read_shape(
     if prim.IsA(UsdGeom.BasisCurves):
         strands = read_curves(UsdGeom.BasisCurves(prim), time, issues, color)
         return _Shape(swept(strands), strands=strands)
+    if prim.IsA(UsdGeom.NurbsCurves):
+        strands = read_nurbs_curves(UsdGeom.NurbsCurves(prim), time, issues, color)
+        return _Shape(swept(strands), strands=strands)
     if prim.IsA(UsdGeom.NurbsPatch):
         return _Shape(read_patch(UsdGeom.NurbsPatch(prim), time, issues, color))
     return _Shape()
@@ -274,6 +278,8 @@ def _attributes(prim: Usd.Prim) -> tuple[str, ...]:
         return POINTS_ATTRIBUTES
     if prim.IsA(UsdGeom.BasisCurves):
         return CURVES_ATTRIBUTES
+    if prim.IsA(UsdGeom.NurbsCurves):
+        return NURBS_CURVES_ATTRIBUTES
     if prim.IsA(UsdGeom.NurbsPatch):
         return PATCH_ATTRIBUTES
     return size_attributes(prim)

@@ -65,7 +65,7 @@ def read_patch(
     prim = patch.GetPrim()
     try:
         u, v = _direction(prim, "u", time), _direction(prim, "v", time)
-        control = _homogeneous(patch, u.count * v.count, time).reshape(v.count, u.count, 4)
+        control = homogeneous_points(patch, u.count * v.count, time).reshape(v.count, u.count, 4)
     except ValueError as error:
         issues.append(f"it is left out: {error}")
         return _polygons(np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 4), int))
@@ -114,9 +114,9 @@ def _direction(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> _Direction:
     return _Direction(count, order - 1, knots, low, high)
 
 
-def _homogeneous(patch: UsdGeom.NurbsPatch, count: int, time: Usd.TimeCode) -> Array:
+def homogeneous_points(based: UsdGeom.NurbsPatch | UsdGeom.NurbsCurves, count: int, time: Usd.TimeCode) -> Array:
     """(count, 4) points times their weights, and the weights. Raises ValueError."""
-    value, authored = patch.GetPointsAttr().Get(time), patch.GetPointWeightsAttr().Get(time)
+    value, authored = based.GetPointsAttr().Get(time), based.GetPointWeightsAttr().Get(time)
     points = None if value is None else floats(value, 3)
     if points is None or len(points) != count or not np.isfinite(points).all():
         raise ValueError(f"points are not {count} finite ones")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import NamedTuple, cast
@@ -45,6 +45,11 @@ class Carried(NamedTuple):
     def laid_on(self, polygons: Polygons) -> Polygons:
         """The polygons with these primvars."""
         return polygons if self is NOTHING_CARRIED else replace(polygons, **self._asdict())
+
+    def mapped(self, change: Callable[[Primvar], Primvar]) -> Carried:
+        """The same with every primvar changed."""
+        color, opacity = (primvar and change(primvar) for primvar in (self.display_color, self.display_opacity))
+        return Carried(color, opacity, {name: change(uv) for name, uv in self.uvs.items()})
 
 
 NOTHING_CARRIED = Carried()
