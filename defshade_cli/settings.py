@@ -11,7 +11,7 @@ Layout = Literal["rgba8", "packed", "float"]
 Shading = Literal["preview-surface", "classic"]
 Existing = Literal["overwrite", "skip", "error"]
 Complexity = Literal["auto", "low", "medium", "high", "veryhigh"]
-Lighting = Literal["auto", "volumes", "tiles"]
+Lighting = Literal["auto", "volumes", "tiles", "whole"]
 Filter = Literal["box", "gaussian", "blackman-harris"]
 Payloads = Literal["all", "none"]
 OnNan = Literal["error", "warn", "fill"]
@@ -23,7 +23,7 @@ LAYOUTS: tuple[Layout, ...] = ("rgba8", "packed", "float")
 SHADINGS: tuple[Shading, ...] = ("preview-surface", "classic")
 EXISTING: tuple[Existing, ...] = ("overwrite", "skip", "error")
 COMPLEXITIES: tuple[Complexity, ...] = ("auto", "low", "medium", "high", "veryhigh")
-LIGHTINGS: tuple[Lighting, ...] = ("auto", "volumes", "tiles")
+LIGHTINGS: tuple[Lighting, ...] = ("auto", "volumes", "tiles", "whole")
 PAYLOADS: tuple[Payloads, ...] = ("all", "none")
 ON_NAN: tuple[OnNan, ...] = ("error", "warn", "fill")
 COMPRESSIONS: tuple[Compression, ...] = ("zip", "zips", "piz", "dwaa", "none")
@@ -121,7 +121,8 @@ class RenderSettings:
     debug: what is drawn over the beauty: the lights' volumes.
     background: dome lights are seen behind the geometry, and cover there.
     motion_blur: several samples see as many moments of the camera's shutter.
-    lighting: lights as blended volumes or by tiles of the image; auto takes what is predicted to be cheaper.
+    lighting: lights as blended volumes, by tiles of the image or all on the whole of it; auto takes what is predicted
+        to be cheapest.
     light_tolerance: scene-linear value that all dropped light together may reach in one pixel.
     """
 

@@ -1,6 +1,6 @@
-#include "lib/shading.glsl"
+#include "lib/light_sum.glsl"
 #include "generated/outputs.glsl"
-#include "generated/light_block.glsl"
+#include "generated/lights.glsl"
 
 layout(std430, binding = 4) readonly buffer LightListBlock { uint light_lists[]; };
 
@@ -17,17 +17,9 @@ void main() {
     Surface surface = read_planes(pixel);
     vec3 v = direction_to_eye(position);
     float blur = pixel_alpha_squared(surface, pixel);
-    Lit total = Lit(vec3(0.0), vec3(0.0), 0.0, 0.0, float(run.y));
+    Lit total = no_light(run.y);
     for (uint i = run.x; i < run.x + run.y; ++i) {
-        Light light = light_at(light_lists[i]);
-        vec3 l;
-        vec3 irradiance = irradiance_from(light, position, l);
-        if (irradiance == vec3(0.0) || !is_lit_by(light, surface)) continue;
-        Lit lit = lit_by(light, l, irradiance, surface, position, v, blur);
-        total.radiance += lit.radiance;
-        total.diffuse += lit.diffuse;
-        total.sent += lit.sent;
-        total.arrived += lit.arrived;
+        add_light(total, light_of(light_lists[i]), surface, position, v, blur);
     }
     write_light(exposed(total));
 }

@@ -1,8 +1,9 @@
-"""Lights by tiles: the picture of the volumes, and lists that miss no light."""
+"""Lights by tiles or on the whole image: the picture of the volumes, and lists that miss no light."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from defshade_cli.passes.light_lists import TILE, LightBounds, list_lights, tile
 from defshade_cli.passes.screen import regions_of
 from defshade_cli.plan import make_plan
 from defshade_cli.plan.cost import covered_share
-from defshade_cli.settings import RenderSettings
+from defshade_cli.settings import LIGHTINGS, RenderSettings
 
 SCENES = [
     "showcase",
@@ -35,43 +36,43 @@ WINDOW = np.array([-0.8, 0.6, -0.5, 0.45])
 SIZE = (5 * TILE - 7, 3 * TILE + 1)
 
 
-def both(stage: Path, **options: Any) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The beauty by volumes and by tiles."""
-    options = {"size": (150, 70), **options}
-    volumes, tiles = (render(stage, lighting=kind, **options).layers["beauty"] for kind in ("volumes", "tiles"))
-    return volumes, tiles
+def differences(
+    stage: Path, names: Sequence[str] = ("beauty",), **options: Any
+) -> Iterator[tuple[NDArray[np.float32], NDArray[np.float32]]]:
+    """The layers by volumes, and the same by tiles and on the whole image."""
+    options = {"size": (150, 70), "layers": names, **options}
+    volumes, *others = (render(stage, lighting=kind, **options).layers for kind in LIGHTINGS[1:])
+    return ((volumes[name], other[name]) for other in others for name in names)
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_picture_is_that_of_the_volumes(name: str, scenes: Path) -> None:
     """But for the order in which floats are added: 35 lights of the showcase, 6e-8 each."""
-    volumes, tiles = both(scenes / f"{name}.usda")
-    np.testing.assert_allclose(tiles, volumes, rtol=35 * 6e-8, atol=1e-7)
+    for volumes, other in differences(scenes / f"{name}.usda"):
+        np.testing.assert_allclose(other, volumes, rtol=35 * 6e-8, atol=1e-7)
 
 
 @pytest.mark.parametrize("options", [{"samples": 3}, {"layout": "rgba8"}, {"shading": "classic"}, {"shadows": False}])
 def test_so_it_is_with_every_option(options: dict[str, Any], scenes: Path) -> None:
-    volumes, tiles = both(scenes / "showcase.usda", **options)
-    np.testing.assert_allclose(tiles, volumes, rtol=35 * 6e-8, atol=1e-7)
+    for volumes, other in differences(scenes / "showcase.usda", **options):
+        np.testing.assert_allclose(other, volumes, rtol=35 * 6e-8, atol=1e-7)
 
 
 def test_layers_of_parts_of_the_light_are_the_same(scenes: Path) -> None:
-    names = ("diffuse", "specular", "shadow")
-    films = [
-        render(scenes / "showcase.usda", size=(96, 54), lighting=kind, layers=names) for kind in ("volumes", "tiles")
-    ]
-    for name in names:
-        np.testing.assert_allclose(films[1].layers[name], films[0].layers[name], rtol=1e-5, atol=1e-6, err_msg=name)
+    names = ("diffuse", "specular", "shadow", "light:default")
+    for volumes, other in differences(scenes / "showcase.usda", names, size=(96, 54)):
+        np.testing.assert_allclose(other, volumes, rtol=1e-5, atol=1e-6)
 
 
 def test_samples_of_a_sky_are_the_same(scenes: Path) -> None:
-    volumes, tiles = both(scenes / "light_dome.usda", samples=4)
-    np.testing.assert_allclose(tiles, volumes, rtol=1e-5, atol=1e-6)
+    for volumes, other in differences(scenes / "light_dome.usda", samples=4):
+        np.testing.assert_allclose(other, volumes, rtol=1e-5, atol=1e-6)
 
 
 def test_finished_tiles_stay_as_they_are(scenes: Path) -> None:
-    volumes, tiles = both(scenes / "light_cone.usda", size=(96, 64), samples=32, max_error=0.05, shadows=False)
-    np.testing.assert_allclose(tiles, volumes, rtol=1e-5, atol=1e-6)
+    options = {"size": (96, 64), "samples": 32, "max_error": 0.05, "shadows": False}
+    for volumes, other in differences(scenes / "light_cone.usda", **options):
+        np.testing.assert_allclose(other, volumes, rtol=1e-5, atol=1e-6)
 
 
 numbers = st.floats(-3.0, 3.0)
@@ -136,16 +137,17 @@ def _lit(centre, reach, axis, angle, points):  # type: ignore[no-untyped-def]
 
 def test_lights_cover_what_they_reach() -> None:
     of = scene([quad(5.0)], [bulb(0, 0, 1.0), sun()])
-    planned = make_plan(of, RenderSettings(size=SIZE)).lights
-    assert covered_share(planned, of.camera) == 2.0
+    planned = make_plan(of, RenderSettings(size=SIZE, light_points=4)).lights
+    assert covered_share(planned, of.camera) == 5.0
     assert covered_share([], of.camera) == 0.0
 
 
-def test_one_light_is_a_volume_and_many_are_tiles() -> None:
+def test_one_light_is_a_volume_and_many_are_tiles_or_cover_the_image() -> None:
     of = scene([quad(5.0)], [bulb(0, 0, 1.0, intensity=1e-6)])
     assert make_plan(of, RenderSettings(size=SIZE, light_tolerance=1e-2)).lighting == "volumes"
     of = scene([quad(5.0)], [bulb(x, 0, 1.0) for x in range(3)])
     assert make_plan(of, RenderSettings(size=SIZE)).lighting == "tiles"
+    assert make_plan(of, RenderSettings(size=(1920, 1080))).lighting == "whole"
     assert make_plan(of, RenderSettings(size=SIZE, layers=("lightComplexity",))).lighting == "volumes"
     assert make_plan(of, RenderSettings(size=SIZE, lighting="volumes")).lighting == "volumes"
 

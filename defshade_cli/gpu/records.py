@@ -82,6 +82,13 @@ def _from_texels(kind: str, offset: int, stem: str) -> str:
     return f"floatBitsToUint({value})" if kind.startswith("u") else value
 
 
+def literal(value: np.generic) -> str:
+    """GLSL: the value of a float or uint field, to the bit."""
+    if value.dtype.kind == "u":
+        return f"{value}u"
+    return f"uintBitsToFloat({np.float32(value).view(np.uint32)}u)"
+
+
 @cache
 def _structs() -> dict[str, str]:
     text = (SHADERS / "lib" / "records.glsl").read_text(encoding="utf-8")

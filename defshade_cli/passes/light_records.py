@@ -20,8 +20,8 @@ from defshade_cli.scene.light import Light, Profile
 from defshade_cli.scene.shadow import PLAIN, ShadowStyle
 
 _PROFILES: tuple[Profile, ...] = ("uniform", "cosine", "sine")
-_NO_CONE = 2.0 * math.pi
-_NO_IES = 0xFFFFFFFF
+NO_CONE = 2.0 * math.pi
+NO_IES = 0xFFFFFFFF
 
 
 def light_records(
@@ -48,9 +48,9 @@ def light_records(
         "response": [(planned.light.diffuse, planned.light.specular) for planned in lights],
         "is_sky": [planned.light.kind == "dome" for planned in lights],
         "first_link": [tables.links.lights.get(planned.light, ALL_LINKED) for planned in lights],
-        "cone_angle": _NO_CONE,
-        "cone_smooth_start": _NO_CONE,
-        "ies_table": _NO_IES,
+        "cone_angle": NO_CONE,
+        "cone_smooth_start": NO_CONE,
+        "ies_table": NO_IES,
     }
     with np.errstate(over="ignore"):  # an infinity in the image is found after the frame, with its light
         for name, values in columns.items():

@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.outputs import outputs_source
 from defshade_cli.gpu.planes import read_source
-from defshade_cli.gpu.records import block_source, record
+from defshade_cli.gpu.records import record
 from defshade_cli.gpu.residence import LIGHT_BLOCK, LIGHT_LISTS, RecordBuffer
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.light_lists import TILE, LightBounds, list_lights, tile_boxes
 from defshade_cli.passes.light_targets import LightTargets
+from defshade_cli.passes.light_traits import Traits, common_traits, lights_source
 from defshade_cli.passes.lighting import LightingVariant
 from defshade_cli.passes.screen import Screen, regions_of
 from defshade_cli.passes.shadow_atlas import ShadowAtlas, kind_of, shadow_source
@@ -45,7 +46,7 @@ class LightTiles:
         self._lists = RecordBuffer(gpu, LIGHT_LISTS)
         self._depth_ranges = cache(lambda *kind: DepthRangesPass(gpu, *kind))
         self._screen = Screen(gpu)
-        self._array = cache(lambda variant: self._screen.array(_compile(gpu, variant, self._most)))
+        self._array = cache(lambda variant, common: self._screen.array(_compile(gpu, variant, common, self._most)))
 
     def begin(self, gbuffer: GBuffer, view: NDArray[Any], plan: Plan) -> None:
         """What the tiles show, by the GBuffer and the View record (1,) that it was drawn with."""
@@ -76,7 +77,8 @@ class LightTiles:
         ]
         for kind in dict.fromkeys(kinds):
             members = np.array([number for number, other in enumerate(kinds) if other == kind])
-            array = self._array(LightingVariant.of(self._plan, [lights[number] for number in members], kind[2]))
+            variant = LightingVariant.of(self._plan, [lights[number] for number in members], kind[2])
+            array = self._array(variant, common_traits(records[members]))
             targets.of(kind[0]).use()
             atlas = shadows.bind(array.program) if shadows else None
             gbuffer.bind(array.program, tile_runs=self._runs, shadow_atlas=atlas, ies_tables=tables.candela)
@@ -116,16 +118,14 @@ class DepthRangesPass:
         return target.read("range").astype(np.float64)
 
 
-def _compile(gpu: Gpu, variant: LightingVariant, most: int) -> moderngl.Program:
+def _compile(gpu: Gpu, variant: LightingVariant, common: Traits, most: int) -> moderngl.Program:
     generated = {
         "generated/planes.glsl": read_source(variant.planes, variant.layout),
         "generated/outputs.glsl": outputs_source(variant.outputs, variant.groups),
-        "generated/light_block.glsl": block_source("Light", most, LIGHT_BLOCK),
+        "generated/lights.glsl": lights_source(most, common),
         **shadow_source(variant.shadows),
     }
-    far = "quad" in variant.volumes
-    distances = ["VOLUME_QUAD" if variant.volumes == ("quad",) else "VOLUMES_MIXED"] * far
-    defines = [*variant.defines, *distances, f"LIGHT_TILE {TILE}"]
+    defines = [*variant.defines, *variant.distances, f"LIGHT_TILE {TILE}"]
     return gpu.shaders.program("screen.vert", "lighting_tiles.frag", defines=defines, generated=generated)
 
 

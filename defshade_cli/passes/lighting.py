@@ -107,6 +107,11 @@ class LightingVariant:
         )
         return [plane.define for plane in self.planes] + flags + output_defines(self.outputs)
 
+    @property
+    def distances(self) -> list[str]:
+        """The macros of a shader for all the volumes at once."""
+        return ["VOLUME_QUAD" if self.volumes == ("quad",) else "VOLUMES_MIXED"] * ("quad" in self.volumes)
+
 
 class LightingPass:
     """Compiled for one variant."""

@@ -24,6 +24,7 @@ from defshade_cli.passes.identification import Manifests, Mattes, id_manifests
 from defshade_cli.passes.light_records import light_records
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.light_tiles import LightTiles
+from defshade_cli.passes.light_whole import WholeLighting
 from defshade_cli.passes.lighting import LightingPass, LightingVariant
 from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.motion import motion_records, neighbouring_points
@@ -80,6 +81,7 @@ class Pipeline:
         self._sky_visibility_pass = cache(lambda variant: SkyVisibilityPass(gpu, variant, self._screen))
         self._shadow_pass = cache(lambda variant: ShadowPass(gpu, variant))
         self._light_tiles = LightTiles(gpu, self._frame)
+        self._whole_lighting = WholeLighting(gpu, self._screen)
         self._tables = TableStore(gpu)
         self._accumulation = AccumulationPass(gpu, self._frame, self._screen)
         self._debug_volumes_pass = cache(lambda: DebugVolumesPass(gpu))
@@ -207,7 +209,7 @@ class Pipeline:
         gbuffer, targets, visibility = canvas.gbuffer, canvas.targets, canvas.visibility
         variant = LightingVariant.of(plan)
         self._emission_pass(variant).draw(gbuffer, targets)
-        if plan.tiled:
+        if plan.lighting == "tiles":
             self._light_tiles.begin(gbuffer, view_record(plan, gbuffer.layout, sample), plan)
         openness = self._sky_visibility_pass(variant) if visibility else None
         if openness and visibility:
@@ -217,7 +219,9 @@ class Pipeline:
             lights, emitters = [lit.planned for lit in batch], [lit.emitter for lit in batch]
             records = light_records(lights, emitters, plan.camera.position, shadows, tables)
             self._lights.write(records)
-            if plan.tiled:
+            if plan.lighting == "whole":
+                self._whole_lighting.add(lights, records, plan, gbuffer, targets, shadows, tables)
+            elif plan.lighting == "tiles":
                 self._light_tiles.add(lights, records, gbuffer, targets, shadows, tables)
             else:
                 self._lighting_pass(variant).add(lights, gbuffer, targets, shadows, tables)

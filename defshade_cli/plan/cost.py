@@ -1,11 +1,12 @@
-"""Whether lights are drawn as blended volumes or by tiles: what is cheaper, by the share of the image that they cover.
+"""How lights are drawn: what is cheapest, by how many there are and the share of the image that they cover.
 
 A volume reads the GBuffer and blends for each pixel that it covers; tiles do so once a pixel, whatever the lights, but
-bin them first.
+bin them first; lights on the whole image need no lists, are half as dear each, and shine where they do not reach.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,24 +16,42 @@ from defshade_cli.scene.camera import Camera
 from defshade_cli.settings import Lighting, RenderSettings
 from defshade_cli.spaces import transform_points
 
-VOLUME, PIXEL, LIGHT = 44.0, 25.0, 14.0
-"""ns: of a volume a covered pixel; of tiles a pixel, and a light there. llvmpipe, the float layout."""
+VOLUME = 44.0
+"""ns a pixel that a volume covers. llvmpipe, the float layout, as all of these."""
+
+TILE_PIXEL, TILE_LIGHT = 39.0, 12.0
+"""ns of tiles a pixel, and a light there."""
+
+WHOLE_DRAW, WHOLE_LIGHT, LIGHTS_A_DRAW = 27.0, 6.5, 8
+"""ns a pixel of a draw of the whole image, and of each of its lights, of which it has so many at most."""
+
+
+_WORTHWHILE = 2**18
+"""Pixels of all samples; for fewer a shader in which lights are written out takes longer to compile than it saves."""
 
 
 def choose_lighting(
-    lights: Sequence[PlannedLight], camera: Camera, settings: RenderSettings, layers: Sequence[str]
+    lights: Sequence[PlannedLight], camera: Camera, settings: RenderSettings, layers: Sequence[str], pixels: int
 ) -> Lighting:
-    """`volumes` or `tiles`. The layer lightComplexity counts volumes, so it has them where nothing is asked."""
+    """pixels: of the image. The layer lightComplexity counts volumes, so it has them where nothing is asked."""
     if settings.lighting != "auto":
         return settings.lighting
     if "lightComplexity" in layers:
         return "volumes"
-    covered = covered_share(lights, camera)
-    return "tiles" if VOLUME * covered > PIXEL + LIGHT * covered else "volumes"
+    covered, count = covered_share(lights, camera), sum(planned.points for planned in lights)
+    costs: dict[Lighting, float] = {
+        "volumes": VOLUME * covered,
+        "tiles": TILE_PIXEL + TILE_LIGHT * covered,
+        "whole": WHOLE_DRAW * math.ceil(count / LIGHTS_A_DRAW) + WHOLE_LIGHT * count,
+    }
+    if pixels * settings.most_samples < _WORTHWHILE:
+        del costs["whole"]
+    return min(costs, key=costs.__getitem__)
 
 
 def covered_share(lights: Sequence[PlannedLight], camera: Camera) -> float:
-    """How many times the lights' volumes cover the image, about: boxes around spheres, discs for them."""
+    """How many times the volumes of a sample's points cover the image, about: boxes around spheres, discs for them."""
+    points = np.array([planned.points for planned in lights])
     reach = np.array([planned.reach for planned in lights])
     distant = np.isinf(reach)
     positions = np.array([planned.light.position for planned in lights]).reshape(-1, 3)[~distant]
@@ -47,4 +66,5 @@ def covered_share(lights: Sequence[PlannedLight], camera: Camera) -> float:
     sides = np.minimum(high, [right, top]) - np.maximum(low, [left, bottom])
     shares = np.pi / 4 * np.prod(np.maximum(sides, 0.0) / [right - left, top - bottom], axis=1)
     seen = depth[:, 0] + reach[:, 0] > 0.0
-    return float(distant.sum() + np.where(around[:, 0], 1.0, np.minimum(shares, 1.0))[seen].sum())
+    shares = np.where(around[:, 0], 1.0, np.minimum(shares, 1.0)) * points[~distant]
+    return float(points[distant].sum() + shares[seen].sum())

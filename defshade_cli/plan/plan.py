@@ -53,7 +53,7 @@ class Plan:
     filter_width: pixels.
     moments: of the shutter that the samples see, in turn; 0 without motion blur.
     planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
-    lights: sorted quads, spheres, cones.  lighting: how they are drawn, volumes or tiles.
+    lights: sorted quads, spheres, cones.  lighting: how they are drawn.
     shadows: some light casts them.  shadow_linked: in some light not all geometry does.
     sky_rays: of a pixel in a sample along its lobes, see plan/sky_rays.py.
     background: domes are seen where no geometry is.
@@ -216,11 +216,6 @@ class Plan:
         return sum(map(count_maps, self.lights))
 
     @property
-    def tiled(self) -> bool:
-        """Are lights binned to tiles of the image?"""
-        return self.lighting == "tiles"
-
-    @property
     def profiles(self) -> tuple[IesProfile, ...]:
         """The IES profiles of the lights, each once."""
         shapings = [planned.light.shaping for planned in self.lights]
@@ -265,7 +260,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         planes=planes,
         data_planes=data_planes,
         lights=lights,
-        lighting=choose_lighting(lights, camera, settings, layers),
+        lighting=choose_lighting(lights, camera, settings, layers, window.width * window.height),
         shadows=shadows,
         shadow_linked=shadows and scene.shadow_linked,
         sky_rays=count_sky_rays(lights, scene, settings, thin=bool(thin)) if _has_light(layers) else 0,

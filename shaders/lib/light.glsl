@@ -19,6 +19,13 @@ bool is_distant(Light light) {
 }
 
 #ifdef SHAPED
+const float NO_CONE = 2.0 * PI;
+
+// By a cone or by focus; a profile of IES apart.
+bool is_shaped(Light light) {
+    return light.cone_angle < NO_CONE || light.focus > 0.0;
+}
+
 // UsdLuxShapingAPI: cone with softness, focus with tint; `cosine` is between the axis and the direction of emission.
 vec3 shaping(Light light, float cosine, float sine) {
     float angle = atan(sine, cosine);
@@ -81,7 +88,7 @@ vec3 irradiance_from(Light light, vec3 position, out vec3 l) {
 #ifdef SHAPED
     float cosine = dot(-l, light.axis);
     float sine = length(cross(l, light.axis));
-    emitted *= shaping(light, cosine, sine);
+    if (is_shaped(light)) emitted *= shaping(light, cosine, sine);
 #endif
     emitted *= profile(light, -l) / distance_squared;
 #ifdef IES

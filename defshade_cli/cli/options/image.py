@@ -114,8 +114,8 @@ def _shading_options() -> list[Function]:
             type=click.Choice(settings.LIGHTINGS),
             default=_RENDER.lighting,
             default_text=str(_RENDER.lighting),
-            help="Lights as volumes that are blended over the image, or in lists by tiles of it: the same picture. "
-            "auto takes what is predicted to be cheaper.",
+            help="Lights as volumes that are blended over the image, in lists by tiles of it, or all on the whole of "
+            "it: the same picture. auto takes what is predicted to be cheapest.",
         ),
         option(
             "--debug",

@@ -1,0 +1,13 @@
+#include "lib/light_sum.glsl"
+#include "generated/outputs.glsl"
+#include "generated/lights.glsl"
+
+// Every light on every pixel that shows a surface: the others fail the depth test.
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    vec3 position = position_at(gl_FragCoord.xy, camera_depth(texelFetch(plane_depth, pixel, 0).x));
+    Surface surface = read_planes(pixel);
+    Lit total = no_light(0u);
+    add_lights(total, surface, position, direction_to_eye(position), pixel_alpha_squared(surface, pixel));
+    write_light(exposed(total));
+}
