@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from defshade_cli.errors import UsageError
 from defshade_cli.image.false_colour import show_coordinates, show_ids, show_matte, show_vectors
 from defshade_cli.image.layers import ID, SCENE_UNITS, UNIT_VECTOR, Layer
-from defshade_cli.image.ocio import displays, open_config
+from defshade_cli.image.ocio import displays, encoding_of, read_config
 from defshade_cli.image.render_space import REC709, RenderSpace
 
 BRIGHTEST = 65504.0
@@ -37,7 +37,7 @@ class DisplayTransform:
     @property
     def encoding(self) -> str:
         """The colour space that pixels arrive in, for a file's header."""
-        return open_config(self.space.config).getDisplayViewColorSpaceName(self.display, self.view)
+        return encoding_of(self.display, self.view, self.space.config)
 
     def apply(self, pixels: Pixels, *, straight: bool = False) -> Pixels:
         """Scene-linear (H, W, 3 or 4), exposure applied → the same shape in [0, 1], encoded for the display.
@@ -77,11 +77,11 @@ def display_transform(
     display: str | None = None, view: str | None = None, look: str | None = None, space: RenderSpace = REC709
 ) -> DisplayTransform:
     """The config's defaults where nothing is chosen. Raises UsageError for a choice that the config lacks."""
-    config, valid = open_config(space.config), displays(space.config)
-    display = display or config.getDefaultDisplayName()
+    config, valid = read_config(space.config), displays(space.config)
+    display = display or config.getDefaultDisplay()
     if display not in valid:
         raise UsageError(f"there is no display '{display}'; the OCIO config has {', '.join(valid)}")
-    view = view or config.getDefaultViewName(display)
+    view = view or config.getDefaultView(display)
     if view not in valid[display]:
         raise UsageError(f"display '{display}' has no view '{view}'; it has {', '.join(valid[display])}")
     if look and look not in config.getLookNames():

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import logging
-import os
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 import PyOpenColorIO as ocio
 from numpy.typing import NDArray
 
 from defshade_cli.image.colour import DisplayTransform
+from defshade_cli.image.ocio import read_config
 
 log = logging.getLogger("defshade")
-
-_BUILT_IN = "ocio://default"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,18 +56,13 @@ def _shader(transform: DisplayTransform) -> DisplayShader:
 
 
 def _processor(transform: DisplayTransform) -> ocio.Processor:
-    config = _config(transform.space.config)
+    config = read_config(transform.space.config)
     shown = ocio.DisplayViewTransform(transform.space.name, transform.display, transform.view)
     pipeline = ocio.LegacyViewingPipeline()
     pipeline.setDisplayViewTransform(shown)
     pipeline.setLooksOverrideEnabled(bool(transform.look))
     pipeline.setLooksOverride(transform.look)
     return pipeline.getProcessor(config)
-
-
-@cache
-def _config(name: str) -> ocio.Config:
-    return ocio.Config.CreateFromFile(name or os.environ.get("OCIO") or _BUILT_IN)
 
 
 def _table(texture: ocio.GpuShaderDesc.Texture | ocio.GpuShaderDesc.Texture3D, shape: tuple[int, ...]) -> Table:

@@ -13,6 +13,9 @@ from defshade_cli.image.layers import BEAUTY
 
 Mask = NDArray[np.bool_]
 
+_STEP = 16
+"""Pixels between those that are looked at first."""
+
 
 @dataclass(frozen=True, slots=True)
 class LayerRange:
@@ -27,14 +30,29 @@ class LayerRange:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameCheck:
-    """ranges: by layer.  black: share of the beauty's covered pixels without any light; 0 without a beauty.
+    """ranges: by layer.  odd: (height, width) masks by layer, of the layers that hold what is no number.
 
-    odd: (height, width) masks by layer, of the layers that hold what is no number.
+    beauty: (height, width, 4), if the film has one.
     """
 
     ranges: Mapping[str, LayerRange]
-    black: float
     odd: Mapping[str, NDArray[np.bool_]]
+    beauty: NDArray[np.float32] | None
+
+    @property
+    def black(self) -> float:
+        """Share of the beauty's covered pixels without any light; 0 without a beauty."""
+        if self.beauty is None:
+            return 0.0
+        return float(_is_dark(self.beauty).sum() / max((self.beauty[..., 3] > 0.0).sum(), 1))
+
+    @property
+    def is_black(self) -> bool:
+        """Is all that is covered without any light? A few pixels tell of most images that it is not."""
+        if self.beauty is None:
+            return False
+        some = self.beauty[::_STEP, ::_STEP]
+        return not ((some[..., 3] > 0.0) & ~_is_dark(some)).any() and self.black == 1.0
 
     def __str__(self) -> str:
         layers = ", ".join(f"{name} {spread}" for name, spread in self.ranges.items())
@@ -45,7 +63,7 @@ def check(film: Film) -> FrameCheck:
     """NaN is odd anywhere, infinity in colours: depth and its like have it for a background."""
     ranges = {name: _range(pixels) for name, pixels in film.layers.items()}
     odd = {name: mask for name in ranges if (mask := _odd(film, name, ranges[name])) is not None}
-    return FrameCheck(ranges, _black(film), odd)
+    return FrameCheck(ranges, odd, film.layers.get(BEAUTY))
 
 
 def filled(film: Film, odd: Mapping[str, NDArray[np.bool_]]) -> Film:
@@ -64,13 +82,10 @@ def _odd(film: Film, name: str, spread: LayerRange) -> Mask | None:
     return np.any(wrong(film.layers[name]), axis=-1) if wrong(bounds).any() else None
 
 
-def _black(film: Film) -> float:
-    beauty = film.layers.get(BEAUTY)
-    if beauty is None:
-        return 0.0
-    covered = beauty[..., 3] > 0.0
-    dark = covered & (beauty[..., 0] <= 0.0) & (beauty[..., 1] <= 0.0) & (beauty[..., 2] <= 0.0)
-    return float(dark.sum() / max(covered.sum(), 1))
+def _is_dark(beauty: NDArray[np.float32]) -> Mask:
+    """(H, W) where covered pixels have no light."""
+    light = beauty[..., :3]
+    return np.asarray((beauty[..., 3] > 0.0) & (light[..., 0] <= 0.0) & (light[..., 1] <= 0.0) & (light[..., 2] <= 0.0))
 
 
 def _filled(pixels: NDArray[np.float32], odd: NDArray[np.bool_]) -> NDArray[np.float32]:

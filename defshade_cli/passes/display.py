@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.shaders import set_uniforms
 from defshade_cli.gpu.targets import allocate
-from defshade_cli.image.colour import Pixels, finite
+from defshade_cli.image.colour import BRIGHTEST, Pixels
 from defshade_cli.passes.screen import Screen
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ class DisplayPass:
         target = allocate(self._gpu, (width, rows), {"shown": (4, "f1" if in_bytes else "f4")})
         image = self._gpu.context.texture((width, rows), channels, dtype="f4")
         image.use(0)
-        self._program["image"], self._program["straight"] = 0, straight
+        set_uniforms(self._program, {"image": 0, "straight": straight, "brightest": BRIGHTEST})
         for unit, (name, table) in enumerate(self._tables.items(), 1):
             table.use(unit)
             self._program[name] = unit
@@ -66,7 +67,7 @@ class DisplayPass:
         self._gpu.context.enable_only(moderngl.NOTHING)
         shown = np.empty(pixels.shape, np.uint8 if in_bytes else np.float32)
         for top in range(0, height, rows):
-            band = np.ascontiguousarray(finite(pixels[top : top + rows]))
+            band = np.ascontiguousarray(pixels[top : top + rows])
             image.write(band, viewport=(0, 0, width, len(band)))
             self._screen.draw(self._array)
             shown[top : top + rows] = target.read("shown")[: len(band), :, :channels]

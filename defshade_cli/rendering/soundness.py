@@ -40,7 +40,7 @@ def sound(film: Film, scene: Scene, settings: RenderSettings, pipeline: Pipeline
     """
     found = check(film)
     log.info("%s", found)
-    if found.black == 1.0:
+    if found.is_black:
         log.warning("the image is black: no light reaches what the camera sees")
     if not found.odd:
         return Sound(film)

@@ -63,10 +63,10 @@ PICTURES = {
 def write_picture(film: Film, name: str, output: OutputSettings, path: Path) -> None:
     """Write the layer `name` as it looks. Raises OSError with the reason, UsageError for no such display or view."""
     form, layer = _format(path), film.row(name)
-    pixels = bounded(name, film.layers[name], half=layer.is_color)
     transform = display_transform(output.display, output.view, output.look, film.render_space)
     shown = film.shown.get((name, form.alpha))
     if shown is None:
+        pixels = bounded(name, film.layers[name], half=layer.is_color)
         shown = picture(layer, pixels, transform, alpha=form.alpha)
     bits = bits_of(path, output)
     spec = make_spec(film, shown.shape[-1], f"uint{bits}")
