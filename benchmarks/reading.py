@@ -29,8 +29,11 @@ def cubes(count: int) -> Usd.Stage:
     return stage
 
 
-def meshes(count: int, side: int, distinct: bool = True) -> Usd.Stage:
-    """Grids of `side` x `side` quads, of which no two are equal where they are `distinct`."""
+def meshes(count: int, side: int, distinct: bool = True, rewired: bool = False) -> Usd.Stage:
+    """Grids of `side` x `side` quads, of which no two are equal where they are `distinct`.
+
+    rewired: faces are in any order, and begin at any of their corners.
+    """
     stage = Usd.Stage.CreateInMemory()
     rng = np.random.default_rng(0)
     corner = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()
@@ -42,7 +45,9 @@ def meshes(count: int, side: int, distinct: bool = True) -> Usd.Stage:
         points = np.stack([x.ravel(), y.ravel(), height], axis=1).astype(np.float32)
         mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
         mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(side * side, 4, np.int32)))
-        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(quads.ravel()))
+        turned = (np.arange(4) + rng.integers(4, size=(len(quads), 1))) % 4
+        faces = np.take_along_axis(rng.permutation(quads), turned, axis=1) if rewired else quads
+        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(faces.ravel()))
         mesh.CreateSubdivisionSchemeAttr("none")
         _place(mesh, number)
     return stage
@@ -52,6 +57,7 @@ GENERATED: dict[str, Callable[[], Usd.Stage]] = {
     "7,000 cubes": lambda: cubes(7000),
     "7,000 equal meshes of 8 triangles": lambda: meshes(7000, 2, distinct=False),
     "7,000 meshes of 8 triangles": lambda: meshes(7000, 2),
+    "7,000 of 8, wired differently": lambda: meshes(7000, 2, rewired=True),
     "400 meshes of 2,592 triangles": lambda: meshes(400, 36),
 }
 

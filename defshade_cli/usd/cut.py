@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TypeGuard
+from dataclasses import replace
+from typing import NamedTuple, TypeGuard
 
 import numpy as np
 
@@ -14,8 +14,7 @@ from defshade_cli.usd.subsets import FaceGroup, Faces
 from defshade_cli.usd.triangulation import triangulate
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Cut:
+class Cut(NamedTuple):
     """Triangles of some polygons, sorted so that each material group is one run.
 
     polygons: what was cut.  split: points are one a corner, because something on the mesh splits them.
@@ -43,7 +42,7 @@ class Cut:
             return None
         points = whole.points[whole.indices] if self.split else whole.points
         at_vertices = whole.at_corners(normals) if self.split else whole.at_points(normals)
-        return replace(self, polygons=polygons, mesh=replace(self.mesh, points=points, normals=at_vertices))
+        return self._replace(polygons=polygons, mesh=replace(self.mesh, points=points, normals=at_vertices))
 
     def _fits(self, polygons: Polygons) -> bool:
         names = ("counts", "indices", "faces", "holes", "display_color", "display_opacity", "left_handed")

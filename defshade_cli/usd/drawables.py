@@ -53,9 +53,9 @@ def drawables_of(
     for (mesh, numbers, _), pieces, (_, groups), placed in zip(
         alike, alike.values(), looks.values(), standing, strict=True
     ):
-        subsets = (Subset(n, group.first, group.count) for n, group in zip(numbers, groups, strict=True))
+        subsets = tuple([Subset(n, group.first, group.count) for n, group in zip(numbers, groups, strict=True)])
         paths = tuple([path for piece in pieces for path in piece.paths])
-        yield Drawable(mesh, placed[0], tuple(subsets), paths, *placed[1:])
+        yield Drawable(mesh, placed[0], subsets, paths, *placed[1:])
 
 
 def _standing(groups: Sequence[Sequence[Piece]], unauthored: Sequence[Material]) -> Iterator[Sequence[NDArray[Any]]]:

@@ -40,8 +40,11 @@ def bounds_of(polygons: Sequence[Polygons]) -> NDArray[np.float64]:
     bounds[:, 0], bounds[:, 1] = np.inf, -np.inf
     used = [(number, each) for number, each in enumerate(polygons) if len(each.indices)]
     if used:
-        corners = np.concatenate([each.points[each.indices] for _, each in used])
-        firsts = np.cumsum([0, *(len(each.indices) for _, each in used)])[:-1]
+        sizes = [len(each.indices) for _, each in used]
+        starts = np.cumsum([0, *(len(each.points) for _, each in used)])[:-1]
+        indices = np.concatenate([each.indices for _, each in used]) + np.repeat(starts, sizes)
+        corners = np.concatenate([each.points for _, each in used])[indices]
+        firsts = np.cumsum([0, *sizes])[:-1]
         rows = [number for number, _ in used]
         bounds[rows, 0] = np.minimum.reduceat(corners, firsts)
         bounds[rows, 1] = np.maximum.reduceat(corners, firsts)

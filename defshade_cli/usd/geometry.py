@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,7 +145,7 @@ def read_surface(
         copies=copies,
         display_color=display_color,
         display_opacity=None if opacity is None else float(opacity),
-        issues=tuple(Unsupported(path, issue) for issue in issues),
+        issues=tuple([Unsupported(path, issue) for issue in issues]),
         strands=strands,
     )
 
@@ -175,7 +174,7 @@ def tessellate(
     mesh = made.mesh
     if (mesh.double_sided, mesh.level) != (surface.double_sided, level):
         mesh = replace(mesh, double_sided=surface.double_sided, level=level)
-    return Gprim(mesh, made.groups, tuple(Unsupported(surface.path, issue) for issue in made.issues), made)
+    return Gprim(mesh, made.groups, tuple([Unsupported(surface.path, issue) for issue in made.issues]), made)
 
 
 def move_surface(
@@ -227,12 +226,8 @@ def _carried(prim: Usd.Prim, color: str, shown: tuple[str, ...]) -> Iterator[Usd
     yield from (p for name, p in found if name in (color, "displayOpacity") or may_be_uvs(p))
 
 
-class _Shape(NamedTuple):
-    """polygons: None for a type that is no supported surface.  copies, strands: as in Surface."""
-
-    polygons: Polygons | None = None
-    copies: Copies | None = None
-    strands: Strands | None = None
+_Shape = tuple[Polygons | None, Copies | None, Strands | None]
+"""No polygons for a type that is no supported surface; copies and strands as in Surface."""
 
 
 def _read_shape(
@@ -240,20 +235,20 @@ def _read_shape(
 ) -> _Shape:
     solid = read_solid(prim, said, time, issues, color, as_cage=as_cages)
     if solid is not None:
-        return _Shape(solid)
-    if prim.IsA(UsdGeom.Mesh):
-        return _Shape(read_mesh(prim, said, time, issues, color))
+        return solid, None, None
+    if said.type_name == "Mesh" or prim.IsA(UsdGeom.Mesh):
+        return read_mesh(prim, said, time, issues, color), None, None
     if prim.IsA(UsdGeom.Points):
-        return _Shape(*read_points(UsdGeom.Points(prim), time, issues, color, as_disks=as_cages))
+        return *read_points(UsdGeom.Points(prim), time, issues, color, as_disks=as_cages), None
     if prim.IsA(UsdGeom.BasisCurves):
         strands = read_curves(UsdGeom.BasisCurves(prim), time, issues, color)
-        return _Shape(swept(strands), strands=strands)
+        return swept(strands), None, strands
     if prim.IsA(UsdGeom.NurbsCurves):
         strands = read_nurbs_curves(UsdGeom.NurbsCurves(prim), time, issues, color)
-        return _Shape(swept(strands), strands=strands)
+        return swept(strands), None, strands
     if prim.IsA(UsdGeom.NurbsPatch):
-        return _Shape(read_patch(UsdGeom.NurbsPatch(prim), time, issues, color))
-    return _Shape()
+        return read_patch(UsdGeom.NurbsPatch(prim), time, issues, color), None, None
+    return None, None, None
 
 
 def _is_double_sided(prim: Usd.Prim, said: Said) -> bool:

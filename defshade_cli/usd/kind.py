@@ -39,6 +39,7 @@ _KINDS = (
 class Nature(NamedTuple):
     """What follows from a prim's type alone."""
 
+    type_name: str
     kind: Kind
     is_imageable: bool
     is_skel_root: bool
@@ -54,7 +55,8 @@ class Kinds:
         """What the prim is; prims of one type are asked once."""
         type_name = prim.GetTypeName()
         if type_name not in self._of_type:
-            self._of_type[type_name] = Nature(_classify(prim), prim.IsA(UsdGeom.Imageable), prim.IsA(UsdSkel.Root))
+            of_prim = _classify(prim), prim.IsA(UsdGeom.Imageable), prim.IsA(UsdSkel.Root)
+            self._of_type[type_name] = Nature(type_name, *of_prim)
         return self._of_type[type_name]
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from functools import lru_cache
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,7 @@ MESH_ATTRIBUTES = ("points", "faceVertexCounts", "faceVertexIndices", "holeIndic
 
 _POINTS = Sdf.ValueTypeNames.Point3fArray.type
 _NONE = np.empty(0, np.int32)
+_FEW_FACES = 64
 
 
 def read_mesh(
@@ -40,17 +42,19 @@ def read_mesh(
     names = said.names
     points = _points(prim, said, time, issues)
     counts, indices = _topology(prim, time, issues) if len(points) else (_NONE, _NONE)
-    is_whole = _is_whole(points, counts, indices)
+    sizes = _sizes(counts)
+    is_whole = sizes.corners == len(indices) and _are_drawn(points, indices)
     if not is_whole:
         counts, indices = _complete(counts, indices, issues)
+        sizes = _sizes(counts)
     scheme = _scheme(prim, issues) if "subdivisionScheme" in names else "catmullClark"
     elements = count_elements(len(counts), len(points), len(indices))
     has_normals = scheme == "none" and ("normals" in names or "primvars:normals" in names)
     polygons = Polygons(
         points=points,
-        counts=counts,
+        counts=sizes.counts,
         indices=indices,
-        faces=np.arange(len(counts), dtype=np.int32),
+        faces=sizes.faces,
         holes=_holes(prim, time, len(counts), issues) if "holeIndices" in names else _NONE,
         scheme=scheme,
         left_handed="orientation" in names and prim.GetAttribute("orientation").Get() == UsdGeom.Tokens.leftHanded,
@@ -80,13 +84,37 @@ def _topology(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> tuple[ND
     return counts, indices
 
 
-def _is_whole(points: NDArray[Any], counts: NDArray[Any], indices: NDArray[Any]) -> bool:
-    """Is everything there and drawn: three corners a face and more, at points that exist and are finite?
+class _Sizes(NamedTuple):
+    """counts, faces: as in Polygons.  corners: of all faces; −1 where one has fewer than three."""
 
-    Reductions of ufuncs, and one for both ends of a range: arrays are small, and each question counts.
+    counts: NDArray[np.integer]
+    faces: NDArray[np.int32]
+    corners: int
+
+
+def _sizes(counts: NDArray[np.integer]) -> _Sizes:
+    """Of few faces the same arrays wherever they are equal: small meshes have so many quads, or so many triangles."""
+    if len(counts) > _FEW_FACES:
+        return _added_up(counts)
+    return _of_few(counts.dtype, counts.tobytes())
+
+
+@lru_cache(maxsize=1 << 12)
+def _of_few(number: np.dtype[Any], counts: bytes) -> _Sizes:
+    return _added_up(np.frombuffer(counts, number))
+
+
+def _added_up(counts: NDArray[np.integer]) -> _Sizes:
+    is_whole = len(counts) and np.minimum.reduce(counts) >= 3
+    corners = int(np.add.reduce(counts, dtype=np.int64)) if is_whole else -1
+    return _Sizes(counts, np.arange(len(counts), dtype=np.int32), corners)
+
+
+def _are_drawn(points: NDArray[Any], indices: NDArray[Any]) -> bool:
+    """Are all corners at points that exist, and all points finite?
+
+    By one reduction for both ends of a range: arrays are small, and each question counts.
     """
-    if not len(counts) or np.minimum.reduce(counts) < 3 or np.add.reduce(counts, dtype=np.int64) != len(indices):
-        return False
     unsigned = indices.view(f"u{indices.itemsize}")  # what is negative is large
     return bool(np.maximum.reduce(unsigned) < len(points)) and are_finite(points)
 

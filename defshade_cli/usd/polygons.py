@@ -73,7 +73,7 @@ class Polygons:
     def primvars(self) -> tuple[Primvar, ...]:
         """All that lies on the faces, points and corners."""
         named = (self.normals, self.display_color, self.display_opacity, *self.uvs.values(), *self.shown.values())
-        return tuple(primvar for primvar in named if primvar is not None)
+        return tuple([primvar for primvar in named if primvar is not None])
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
@@ -160,7 +160,6 @@ class Polygons:
             return self
         return replace(self, display_color=color, display_opacity=opacity)
 
-    @cached_property
     def digest(self) -> Hashable:
         """Equal for polygons that are equal in everything: of few corners their bytes, else a hash of these."""
         arrays = [self.points, self.counts, self.indices, self.faces, self.holes]

@@ -20,8 +20,14 @@ class Said(NamedTuple):
     primvars: bool
 
 
-def said_of(prim: Usd.Prim, *, primvars_above: bool = True, clipped: bool = False) -> Said:
-    """primvars_above: may an ancestor have some?  clipped: value clips may say more than is authored, see has_clips."""
+def said_of(
+    prim: Usd.Prim, type_name: str | None = None, *, primvars_above: bool = True, clipped: bool = False
+) -> Said:
+    """primvars_above: may an ancestor have some?  clipped: value clips may say more than is authored, see has_clips.
+
+    type_name: of the prim, where it is known.
+    """
     names = prim.GetPropertyNames() if clipped else prim.GetAuthoredPropertyNames()
     primvars = primvars_above or "\nprimvars:" in "\n" + "\n".join(names)
-    return Said(str(prim.GetPath()), prim.GetTypeName(), names, primvars)
+    type_name = prim.GetTypeName() if type_name is None else type_name
+    return Said(str(prim.GetPath()), type_name, names, primvars)

@@ -16,4 +16,4 @@ class Shapes:
 
     def shared(self, polygons: Polygons) -> Polygons:
         """The polygons that were given first, of those that equal these."""
-        return self._known.setdefault(polygons.digest, polygons)
+        return self._known.setdefault(polygons.digest(), polygons)

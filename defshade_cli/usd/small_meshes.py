@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import compress, pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +60,8 @@ def shape_all(meshes: Iterable[Polygons]) -> dict[Polygons, Shaped]:
 def _small(meshes: Iterable[Polygons]) -> Iterator[Polygons]:
     few = [mesh for mesh in meshes if 0 < len(mesh.indices) <= _LARGEST and not len(mesh.holes)]
     if few:
-        most = np.maximum.reduceat(np.concatenate([mesh.counts for mesh in few]), _ends(few, "counts")[:-1])
+        counts = [mesh.counts for mesh in few]
+        most = np.maximum.reduceat(np.concatenate(counts), _ends(counts)[:-1])
         yield from compress(few, most <= _MOST_CORNERS)
 
 
@@ -74,7 +75,9 @@ def _blocks(meshes: Sequence[Polygons]) -> Iterator[Sequence[Polygons]]:
 
 def _shape(meshes: Sequence[Polygons]) -> Iterator[Shaped]:
     """meshes: of one scheme and handedness, all of them with normals or none."""
-    points, faces, corners = _ends(meshes, "points"), _ends(meshes, "counts"), _ends(meshes, "indices")
+    points = _ends([mesh.points for mesh in meshes])
+    faces = _ends([mesh.counts for mesh in meshes])
+    corners = _ends([mesh.indices for mesh in meshes])
     whole = with_normals(_end_to_end(meshes, points[:-1]))
     cut, face = triangulate(whole, [])
     ends = np.searchsorted(face, faces)
@@ -117,9 +120,9 @@ def _drawn(
     return Corners(*arrays, split)
 
 
-def _ends(meshes: Sequence[Polygons], name: str) -> NDArray[np.intp]:
-    """(M + 1,) where the elements of each mesh begin, and where the last ones end."""
-    return np.cumsum([0, *(len(getattr(mesh, name)) for mesh in meshes)])
+def _ends(arrays: Iterable[NDArray[Any]]) -> NDArray[np.intp]:
+    """(M + 1,) where each of the arrays begins when they are laid end to end, and where the last one ends."""
+    return np.cumsum([0, *map(len, arrays)])
 
 
 def _end_to_end(meshes: Sequence[Polygons], first_points: NDArray[np.intp]) -> Polygons:

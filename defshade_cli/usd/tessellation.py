@@ -90,4 +90,4 @@ def _renamed(gprim: Gprim, surface: Surface) -> Gprim:
     """The same triangles, all of one group, for another prim."""
     groups = tuple(FaceGroup(surface.faces.paths[0], group.first, group.count) for group in gprim.groups)
     issues = tuple(replace(issue, path=surface.path) for issue in gprim.issues)
-    return Gprim(gprim.mesh, groups, issues, replace(gprim.cut, faces=surface.faces, groups=groups))
+    return Gprim(gprim.mesh, groups, issues, gprim.cut._replace(faces=surface.faces, groups=groups))

@@ -85,7 +85,8 @@ class Traversal:
             except Exception as error:  # a bug goes on as one
                 self._report(prim, blamed(error, prim))
                 continue
-            stack.extend((child, here) for child in reversed(children))
+            if children:
+                stack.extend([(child, here) for child in reversed(children)])
         pieces.extend(self._native_instances(instances))
         return tuple(pieces)
 
@@ -97,7 +98,7 @@ class Traversal:
         kind = nature.kind
         if kind is Kind.SHADING or self._is_pruned(prim):
             return (), above
-        said = said_of(prim, primvars_above=above.primvars, clipped=self._memory.clipped)
+        said = said_of(prim, nature.type_name, primvars_above=above.primvars, clipped=self._memory.clipped)
         here = self._stand(prim, above, nature, said)
         if here is None:
             return (), above
