@@ -51,7 +51,8 @@ def inspect(job: RenderJob, as_json: bool, with_plan: bool, timing: bool, saved:
     Cameras, lights and the volumes they are drawn as, materials, geometry, and the prims that would be left out. It
     renders nothing and needs no graphics device, but for --timing.
     """
-    from defshade_cli.rendering import examine, save_settings, time_steps
+    from defshade_cli.rendering import examine, time_steps
+    from defshade_cli.rendering.saving import save_settings
 
     show_log()
     scene, plan = examine(job)

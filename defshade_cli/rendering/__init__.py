@@ -7,7 +7,6 @@ saving     a command line as part of a stage
 
 from defshade_cli.rendering.renderer import Renderer
 from defshade_cli.rendering.results import FrameResult, ImageResult
-from defshade_cli.rendering.saving import save_settings
 from defshade_cli.rendering.story import examine, render, run, time_steps
 
-__all__ = ["FrameResult", "ImageResult", "Renderer", "examine", "render", "run", "save_settings", "time_steps"]
+__all__ = ["FrameResult", "ImageResult", "Renderer", "examine", "render", "run", "time_steps"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import cast, get_args
+from typing import TYPE_CHECKING, cast, get_args
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -12,9 +12,11 @@ from pxr import Usd, UsdGeom
 
 from defshade_cli.usd.polygons import Polygons
 from defshade_cli.usd.said import Said
-from defshade_cli.usd.subdivision import LinearInterpolation, Topology
-from defshade_cli.usd.subdivision.topology import BoundaryRule, SchemeName, TriangleRule
 from defshade_cli.usd.values import floats, integers
+
+if TYPE_CHECKING:
+    from defshade_cli.usd.subdivision import LinearInterpolation, Topology
+    from defshade_cli.usd.subdivision.topology import BoundaryRule, SchemeName, TriangleRule
 
 CONTROL_ATTRIBUTES = (
     "creaseIndices",
@@ -77,12 +79,14 @@ def smooth_control(polygons: Polygons) -> Control | None:
 
 def _plain_topology(polygons: Polygons) -> Topology:
     """With the schema's rules, and without creases and corners; once for polygons that surfaces share."""
+    from defshade_cli.usd.subdivision import Topology
+
     if polygons not in _PLAIN:
         _PLAIN[polygons] = Topology(
             face_counts=polygons.counts,
             face_indices=polygons.indices,
             vertex_count=len(polygons.points),
-            scheme=cast(SchemeName, polygons.scheme),
+            scheme=cast("SchemeName", polygons.scheme),
             holes=np.flatnonzero(np.isin(polygons.faces, polygons.holes)),
         )
     return _PLAIN[polygons]
@@ -90,13 +94,15 @@ def _plain_topology(polygons: Polygons) -> Topology:
 
 def _read_topology(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode) -> Topology:
     """Raises ValueError where the arrays contradict each other."""
+    from defshade_cli.usd.subdivision import Topology
+
     return Topology(
         face_counts=polygons.counts,
         face_indices=polygons.indices,
         vertex_count=len(polygons.points),
-        scheme=cast(SchemeName, polygons.scheme),
-        interpolate_boundary=cast(BoundaryRule, mesh.GetInterpolateBoundaryAttr().Get(time)),
-        triangle_subdivision_rule=cast(TriangleRule, mesh.GetTriangleSubdivisionRuleAttr().Get(time)),
+        scheme=cast("SchemeName", polygons.scheme),
+        interpolate_boundary=cast("BoundaryRule", mesh.GetInterpolateBoundaryAttr().Get(time)),
+        triangle_subdivision_rule=cast("TriangleRule", mesh.GetTriangleSubdivisionRuleAttr().Get(time)),
         holes=np.flatnonzero(np.isin(polygons.faces, polygons.holes)),
         crease_indices=_indices(mesh.GetCreaseIndicesAttr(), time),
         crease_lengths=_indices(mesh.GetCreaseLengthsAttr(), time),
@@ -107,6 +113,8 @@ def _read_topology(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode) -
 
 
 def _face_varying(mesh: UsdGeom.Mesh, time: Usd.TimeCode, issues: list[str]) -> LinearInterpolation:
+    from defshade_cli.usd.subdivision import LinearInterpolation
+
     rule = mesh.GetFaceVaryingLinearInterpolationAttr().Get(time)
     if rule in get_args(LinearInterpolation):
         return cast(LinearInterpolation, rule)

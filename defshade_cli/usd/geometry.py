@@ -2,6 +2,8 @@
 
 prim ── mesh | gprims ──→ Polygons ──→ Surface      what is authored, read once
 Surface ── refiner ── normals ── cut ──→ Gprim      as finely as the picture needs
+
+What reads prims of one type alone is imported where there are such.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +21,11 @@ from defshade_cli.scene.geometry import Mesh
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.control import CONTROL_ATTRIBUTES, Control, read_control, smooth_control
 from defshade_cli.usd.copies import Copies
-from defshade_cli.usd.curves import CURVES_ATTRIBUTES, read_curves
 from defshade_cli.usd.cut import Cut, cut, varies
 from defshade_cli.usd.flatness import flatness
 from defshade_cli.usd.gprims import read_solid, size_attributes
 from defshade_cli.usd.mesh import MESH_ATTRIBUTES, read_mesh
 from defshade_cli.usd.normals import with_normals
-from defshade_cli.usd.nurbs import PATCH_ATTRIBUTES, read_patch
-from defshade_cli.usd.nurbs_curves import NURBS_CURVES_ATTRIBUTES, read_nurbs_curves
-from defshade_cli.usd.points import POINTS_ATTRIBUTES, read_points
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.positions import is_carried_by_velocities, read_positions
 from defshade_cli.usd.primvars import (
@@ -37,14 +36,15 @@ from defshade_cli.usd.primvars import (
     may_be_uvs,
     read_shown,
 )
-from defshade_cli.usd.refiner import Refiner
 from defshade_cli.usd.said import Said, said_of
 from defshade_cli.usd.shapes import Shapes
 from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.small_meshes import Shaped
-from defshade_cli.usd.strands import Strands
 from defshade_cli.usd.subsets import FaceGroup, Faces, material_subsets, read_faces
-from defshade_cli.usd.sweep import swept
+
+if TYPE_CHECKING:
+    from defshade_cli.usd.refiner import Refiner
+    from defshade_cli.usd.strands import Strands
 
 __all__ = ["FaceGroup", "Gprim", "Surface", "is_time_varying", "read_surface", "tessellate"]
 
@@ -226,7 +226,7 @@ def _carried(prim: Usd.Prim, color: str, shown: tuple[str, ...]) -> Iterator[Usd
     yield from (p for name, p in found if name in (color, "displayOpacity") or may_be_uvs(p))
 
 
-_Shape = tuple[Polygons | None, Copies | None, Strands | None]
+_Shape: TypeAlias = "tuple[Polygons | None, Copies | None, Strands | None]"
 """No polygons for a type that is no supported surface; copies and strands as in Surface."""
 
 
@@ -239,16 +239,28 @@ def _read_shape(
     if said.type_name == "Mesh" or prim.IsA(UsdGeom.Mesh):
         return read_mesh(prim, said, time, issues, color), None, None
     if prim.IsA(UsdGeom.Points):
+        from defshade_cli.usd.points import read_points
+
         return *read_points(UsdGeom.Points(prim), time, issues, color, as_disks=as_cages), None
     if prim.IsA(UsdGeom.BasisCurves):
-        strands = read_curves(UsdGeom.BasisCurves(prim), time, issues, color)
-        return swept(strands), None, strands
+        from defshade_cli.usd.curves import read_curves
+
+        return _along(read_curves(UsdGeom.BasisCurves(prim), time, issues, color))
     if prim.IsA(UsdGeom.NurbsCurves):
-        strands = read_nurbs_curves(UsdGeom.NurbsCurves(prim), time, issues, color)
-        return swept(strands), None, strands
+        from defshade_cli.usd.nurbs_curves import read_nurbs_curves
+
+        return _along(read_nurbs_curves(UsdGeom.NurbsCurves(prim), time, issues, color))
     if prim.IsA(UsdGeom.NurbsPatch):
+        from defshade_cli.usd.nurbs import read_patch
+
         return read_patch(UsdGeom.NurbsPatch(prim), time, issues, color), None, None
     return None, None, None
+
+
+def _along(strands: Strands) -> _Shape:
+    from defshade_cli.usd.sweep import swept
+
+    return swept(strands), None, strands
 
 
 def _is_double_sided(prim: Usd.Prim, said: Said) -> bool:
@@ -270,12 +282,20 @@ def _attributes(prim: Usd.Prim) -> tuple[str, ...]:
     if prim.IsA(UsdGeom.Mesh):
         return MESH_ATTRIBUTES + CONTROL_ATTRIBUTES
     if prim.IsA(UsdGeom.Points):
+        from defshade_cli.usd.points import POINTS_ATTRIBUTES
+
         return POINTS_ATTRIBUTES
     if prim.IsA(UsdGeom.BasisCurves):
+        from defshade_cli.usd.curves import CURVES_ATTRIBUTES
+
         return CURVES_ATTRIBUTES
     if prim.IsA(UsdGeom.NurbsCurves):
+        from defshade_cli.usd.nurbs_curves import NURBS_CURVES_ATTRIBUTES
+
         return NURBS_CURVES_ATTRIBUTES
     if prim.IsA(UsdGeom.NurbsPatch):
+        from defshade_cli.usd.nurbs import PATCH_ATTRIBUTES
+
         return PATCH_ATTRIBUTES
     return size_attributes(prim)
 

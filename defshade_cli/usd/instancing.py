@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, compress, repeat
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,11 @@ from defshade_cli.scene.light import Light
 from defshade_cli.usd.binding import NOTHING_BOUND, Bindings
 from defshade_cli.usd.geometry import Surface
 from defshade_cli.usd.primvars import read_display
-from defshade_cli.usd.skel import Rig
 from defshade_cli.usd.values import within_reach
 from defshade_cli.usd.xform import IDENTITY
+
+if TYPE_CHECKING:
+    from defshade_cli.usd.skel import Rig
 
 MOST_COPIES = 1 << 24
 """Of one prim: their matrices take 2 GiB. Thirty prims that each instance another twice are a billion."""
@@ -57,12 +59,14 @@ class Standing(NamedTuple):
 
     def with_rig(self, root: Usd.Prim) -> Standing:
         """The same with a SkelRoot that stands here, unless one stands above."""
+        from defshade_cli.usd.skel import Rig
+
         return self if self.rig else self._replace(rig=Rig(self.on_stage(root), self.root_from_prim, self.in_world))
 
     def inside(self, instance: Usd.Prim) -> Standing:
         """What an instance hands down into its prototype: nothing but its rig."""
         proxy = self.on_stage(instance)
-        rig = Rig(proxy, IDENTITY, False) if self.rig else None
+        rig = self.rig and type(self.rig)(proxy, IDENTITY, False)
         proxied = instance.GetPrototype().GetPath(), proxy.GetPath()
         return Standing(rig=rig, proxied=proxied, primvars=self.primvars)
 

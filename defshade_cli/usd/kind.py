@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum, auto
 from typing import NamedTuple
 
-from pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdSkel
+from pxr import Tf, Usd, UsdGeom, UsdLux, UsdShade
 
 
 class Kind(Enum):
@@ -22,12 +22,15 @@ class Kind(Enum):
     UNKNOWN = auto()
 
 
+_SKEL_ROOT, _SKELETON = Tf.Type.FindByName("UsdSkelRoot"), Tf.Type.FindByName("UsdSkelSkeleton")
+"""As types: the module of their schemas is imported where there are any."""
+
 _KINDS = (
     (UsdGeom.PointInstancer, Kind.POINT_INSTANCER),
     (UsdGeom.Gprim, Kind.GPRIM),
     (UsdLux.BoundableLightBase, Kind.GROUP),
-    (UsdSkel.Root, Kind.GROUP),
-    (UsdSkel.Skeleton, Kind.GROUP),
+    (_SKEL_ROOT, Kind.GROUP),
+    (_SKELETON, Kind.GROUP),
     (UsdGeom.Boundable, Kind.UNDRAWN),
     (UsdGeom.Subset, Kind.SHADING),
     (UsdShade.NodeGraph, Kind.SHADING),
@@ -55,7 +58,7 @@ class Kinds:
         """What the prim is; prims of one type are asked once."""
         type_name = prim.GetTypeName()
         if type_name not in self._of_type:
-            of_prim = _classify(prim), prim.IsA(UsdGeom.Imageable), prim.IsA(UsdSkel.Root)
+            of_prim = _classify(prim), prim.IsA(UsdGeom.Imageable), prim.IsA(_SKEL_ROOT)
             self._of_type[type_name] = Nature(type_name, *of_prim)
         return self._of_type[type_name]
 

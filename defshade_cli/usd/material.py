@@ -19,7 +19,6 @@ from pxr import Sdf, Usd, UsdShade
 from defshade_cli.scene.material import TEXTURED_FIELDS, UNBOUND, UV_SETS, Material
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.scene.texture import TextureInput
-from defshade_cli.usd.materialx.models import MODELS, translate
 from defshade_cli.usd.network import Network, computed, node_of
 from defshade_cli.usd.primvars import DISPLAY_COLOR
 from defshade_cli.usd.texture import Unreadable, read_texture_input
@@ -94,7 +93,9 @@ def read_material(
         inputs = _read_inputs(shader, network, () if occlusion else _WITHOUT_EFFECT)
         material = Material(shown_as, **_sound(inputs.values, inputs.left_out), inputs=inputs.textures)
         reason, left_out = "without", inputs.left_out
-    elif identifier in MODELS:
+    elif _is_understood(identifier):
+        from defshade_cli.usd.materialx.models import translate
+
         translation = translate(shader, identifier, network, occlusion=occlusion)
         reason, left_out = f"lost of {identifier}:", list(translation.lost)
         material = Material(shown_as, **_sound(translation.values, left_out), inputs=translation.textures)
@@ -110,9 +111,18 @@ def _surface_of(material: UsdShade.Material) -> tuple[UsdShade.Shader, str]:
     sources = [material.ComputeSurfaceSource(c)[0] for c in (UsdShade.Tokens.universalRenderContext, _MATERIALX)]
     for shader in filter(None, sources):
         identifier = str(shader.GetShaderId() or "")
-        if identifier == _PREVIEW_SURFACE or identifier in MODELS:
+        if _is_understood(identifier):
             return shader, identifier
     return sources[0], str(sources[0].GetShaderId() or "") if sources[0] else ""
+
+
+def _is_understood(identifier: str) -> bool:
+    """MaterialX is imported where something else than a UsdPreviewSurface is met."""
+    if identifier in ("", _PREVIEW_SURFACE):
+        return bool(identifier)
+    from defshade_cli.usd.materialx.models import MODELS
+
+    return identifier in MODELS
 
 
 def not_understood(path: str, reason: str) -> ReadMaterial:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 from pxr import Sdf, Usd, UsdGeom
 
@@ -20,9 +22,11 @@ from defshade_cli.usd.primvars import DISPLAY_COLOR
 from defshade_cli.usd.said import Said
 from defshade_cli.usd.shapes import Shapes
 from defshade_cli.usd.sharing import shared
-from defshade_cli.usd.skel import Rigs
 from defshade_cli.usd.stage import has_clips
 from defshade_cli.usd.subsets import material_subsets
+
+if TYPE_CHECKING:
+    from defshade_cli.usd.skel import Rigs
 
 
 class Memory:
@@ -30,7 +34,7 @@ class Memory:
 
     seen_from: for cards placed by their textures.
     as_cages: what is round is what Hydra draws of it: see gprims.read_solid, and facing.
-    kinds: of prims.  rigs: what skeletons deform.  clipped: see stage.has_clips.
+    kinds: of prims.  clipped: see stage.has_clips.
     xforms: USD's cache, which drops only what varies when its time is set.
     """
 
@@ -44,7 +48,6 @@ class Memory:
     ) -> None:
         self.kinds = Kinds()
         self.clipped = has_clips(stage)
-        self.rigs = Rigs()
         self.xforms = UsdGeom.XformCache()
         self._stage, self._extras, self._as_cages = stage, extras, as_cages
         self._shapes = Shapes()
@@ -55,6 +58,13 @@ class Memory:
         self._first_instances: dict[str, str] = {}
         self._models = draw_mode.StandIns(seen_from)
         self._stand_ins: dict[tuple[Sdf.Path, str], Surface] = {}
+
+    @cached_property
+    def rigs(self) -> Rigs:
+        """What skeletons deform."""
+        from defshade_cli.usd.skel import Rigs
+
+        return Rigs()
 
     def surface_around(self, prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode, said: Said) -> Surface | None:
         """The surface at a time near `base`, a frame. A mesh that velocities carry has what it has at the frame.

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 from weakref import WeakKeyDictionary, ref
 
 from defshade_cli.usd.control import Control
 from defshade_cli.usd.geometry import FaceGroup, Gprim, Surface, tessellate
 from defshade_cli.usd.polygons import Polygons
-from defshade_cli.usd.refiner import Refiner
 from defshade_cli.usd.small_meshes import Shaped, shape_all
+
+if TYPE_CHECKING:
+    from defshade_cli.usd.refiner import Refiner
 
 
 class Tessellation:
@@ -67,6 +69,8 @@ class Tessellation:
     def _refiner(self, path: str, control: Control, level: int) -> Refiner:
         known = self._refiners.get(path)
         if known is None or not known.fits(control, level):
+            from defshade_cli.usd.refiner import Refiner
+
             known = self._refiners[path] = Refiner(control, level)
         return known
 

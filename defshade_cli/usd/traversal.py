@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from pxr import Sdf, Usd, UsdGeom, UsdLux
 
@@ -27,9 +28,11 @@ from defshade_cli.usd.native_instances import NativeInstances
 from defshade_cli.usd.point_instancer import has_varying_copies, read_point_instancer
 from defshade_cli.usd.render_pass import PassRules
 from defshade_cli.usd.said import Said, said_of
-from defshade_cli.usd.skel import Rig
 from defshade_cli.usd.values import STANDS_NOWHERE
 from defshade_cli.usd.xform import gf_matrix, matrix
+
+if TYPE_CHECKING:
+    from defshade_cli.usd.skel import Rig
 
 _VISIBILITY, _PURPOSE = str(UsdGeom.Tokens.visibility), str(UsdGeom.Tokens.purpose)
 _XFORM_OPS = str(UsdGeom.Tokens.xformOpOrder)
