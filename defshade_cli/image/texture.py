@@ -119,7 +119,7 @@ def resized(image: TexelImage, size: tuple[int, int]) -> TexelImage:
 
 def world_to_screen(file: ImageFile) -> Matrix | None:
     """(4, 4): scene.texture.SeenFrom by the image's header. Raises OSError with the reason."""
-    with _opened(file) as image:
+    with opened(file) as image:
         values = np.ravel(image.spec().getattribute("worldtoscreen") or ())
     return values.astype(np.float64).reshape(4, 4) if values.size == 16 and values.dtype.kind in "fi" else None
 
@@ -139,7 +139,7 @@ def _each(read: Callable[[Source], _T], sources: Iterable[Source]) -> Iterator[t
 
 
 def _read_image(source: Source, side: int) -> TexelImage:
-    with _opened(source.file) as image:
+    with opened(source.file) as image:
         spec = image.spec()
         channels, eight_bit, wrap = spec.nchannels, spec.format == oiio.UINT8, _wraps(spec)
         if max(spec.width, spec.height) > side:
@@ -202,7 +202,7 @@ def _half(texels: NDArray[Any]) -> NDArray[np.float16]:
 
 
 @contextmanager
-def _opened(file: ImageFile) -> Iterator[oiio.ImageInput]:
+def opened(file: ImageFile) -> Iterator[oiio.ImageInput]:
     """An open image. Raises OSError with the reason."""
     with _on_disk(file) as path:
         as_stored = oiio.ImageSpec()

@@ -50,6 +50,10 @@ def explain(plan: Plan) -> Iterator[Decision]:
     if plan.portals:
         yield Decision("portals", "passed over", "hints: domes are sampled by their radiance")
     yield _kept("cutout", plan.cutout, "some opacity is or may be below 1", "no opacity is below 1")
+    if plan.solid:
+        yield Decision(
+            "opacity images", f"{plan.solid} passed over", "1 wherever they are seen: these surfaces are solid"
+        )
     glass = "some opacity scales the diffuse alone: lobes stay"
     yield _kept("transparency", plan.transparent, glass, "no opacity does that")
     yield _kept("textures", plan.textures, "a material reads them", "no material reads any")

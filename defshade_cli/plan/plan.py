@@ -23,6 +23,7 @@ from defshade_cli.plan.opacity import is_transparent, thin_materials, thin_numbe
 from defshade_cli.plan.points import pixel_share
 from defshade_cli.plan.shadow_maps import count_maps, shadow_resolution
 from defshade_cli.plan.sky_rays import count_sky_rays
+from defshade_cli.plan.solidity import solid_materials
 from defshade_cli.plan.texels import seen_texels
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.ies import IesProfile
@@ -58,6 +59,7 @@ class Plan:
     sky_rays: of a pixel in a sample along its lobes, see plan/sky_rays.py.
     background: domes are seen where no geometry is.
     thin: numbers of the materials whose opacity may be below 1.  transparent: it scales the diffuse of some alone.
+    solid: how many have opacity from an image that is 1 where they read it, see plan/solidity.py.
     texels: of each texture that is read, a side that it is worth, see plan/texels.py.
     data_pass: data layers need an unjittered float GBuffer of their own.
     portals: how many hints for sampling domes the stage has.
@@ -92,6 +94,7 @@ class Plan:
     sky_rays: int
     background: bool
     thin: tuple[int, ...]
+    solid: int
     transparent: bool
     texels: Mapping[Texture, float]
     data_pass: bool
@@ -236,7 +239,8 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     camera = replace(display_camera, window=window.of(display_camera.window, display))
     exposure = camera.exposure * exposure_scale(settings.exposure)
     lights = _seen_lights(plan_lights(scene, exposure, settings, layers), layers)
-    thin = thin_materials(scene)
+    solid = solid_materials(scene)
+    thin = thin_materials(scene, solid)
     planes, data_planes, data_pass = _divide_planes(scene, settings, layers, thin)
     shadows = settings.shadows and bool(scene.drawables) and any(p.light.casts_shadow for p in lights)
     return Plan(
@@ -266,6 +270,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         sky_rays=count_sky_rays(lights, scene, settings, thin=bool(thin)) if _has_light(layers) else 0,
         background=settings.background,
         thin=thin_numbers(scene, thin),
+        solid=len(solid),
         transparent=is_transparent(thin, settings.shading),
         texels=seen_texels(scene, View(display_camera, display[1])),
         data_pass=data_pass,

@@ -1,0 +1,60 @@
+"""Where an image is below 1, told before any is loaded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from defshade_cli.image.texture import opened
+from defshade_cli.scene.texture import Channel, ImageFile
+
+_CELLS = 512
+"""A side, that are told apart at most."""
+
+_KNOWN: dict[tuple[str, int, Channel], NDArray[np.bool_]] = {}
+
+
+def below_one(file: ImageFile, channel: Channel) -> NDArray[np.bool_]:
+    """(H, W), row 0 at the bottom: cells of an image in which the channel, the first of several, is below 1 somewhere.
+
+    One cell where all are alike. Raises OSError for what cannot be read.
+    """
+    key = file.path, _stamp(file), channel
+    if key not in _KNOWN:
+        _KNOWN[key] = _looked_at(file, channel)
+    return _KNOWN[key]
+
+
+def _stamp(file: ImageFile) -> int:
+    """Another where the file is another. Raises OSError."""
+    return Path(file.path).stat().st_mtime_ns if file.contents is None else hash(file.contents)
+
+
+def _looked_at(file: ImageFile, channel: Channel) -> NDArray[np.bool_]:
+    with opened(file) as image:
+        spec = image.spec()
+        at = _place(spec.nchannels, channel)
+        if at is None:
+            return np.zeros((1, 1), bool)
+        kind, one = (oiio.UINT8, 255) if spec.format == oiio.UINT8 else (oiio.FLOAT, 1.0)
+        texels = image.read_image(0, 0, at, at + 1, kind)
+        if texels is None:
+            raise OSError(image.geterror())
+    below = ~(texels[::-1, :, 0] >= one)
+    return _in_cells(below) if below.any() and not below.all() else below[:1, :1]
+
+
+def _in_cells(below: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    size = -(-max(below.shape) // _CELLS)
+    rows, columns = (np.arange(0, side, size) for side in below.shape)
+    return np.logical_or.reduceat(np.logical_or.reduceat(below, rows, axis=0), columns, axis=1)
+
+
+def _place(channels: int, channel: Channel) -> int | None:
+    """Of the channel in a file, by the rules of UsdUVTexture; None for an alpha that it lacks, which is 1."""
+    if channel == "a":
+        return channels - 1 if channels in (2, 4) else None
+    return "rgb".index(channel[0]) if channels >= 3 else 0
