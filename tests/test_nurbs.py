@@ -96,11 +96,12 @@ def test_bad_patches_are_left_out_and_said(attribute: str, value: object, reason
     assert reasons(drawn) == [f"it is left out: {reason}"] and not drawn.surface.groups
 
 
-def sheet() -> UsdGeom.NurbsPatch:
+def sheet(spans: int = 1) -> UsdGeom.NurbsPatch:
     """The square from 0 to 4 in the plane z = 0, along which u and v are x and y."""
-    grid = np.stack(np.meshgrid(np.linspace(0, 4, 2), np.linspace(0, 4, 2)), axis=-1)
-    knots = [0.0, 0.0, 4.0, 4.0]
-    return patch(np.concatenate([grid, np.zeros((2, 2, 1))], axis=-1), (2, 2, knots), (2, 2, knots))
+    at = np.linspace(0.0, 4.0, spans + 1)
+    grid = np.stack(np.meshgrid(at, at), axis=-1)
+    along = (spans + 1, 2, [0.0, *at.tolist(), 4.0])
+    return patch(np.concatenate([grid, np.zeros((*grid.shape[:2], 1))], axis=-1), along, along)
 
 
 def circle(radius: float, center: tuple[float, float] = (2.0, 2.0), *, clockwise: bool = False) -> NDArray:
@@ -143,7 +144,19 @@ def area(schema: UsdGeom.NurbsPatch) -> float:
     ],
 )
 def test_trim_curves_bound_what_is_drawn(circles: list[NDArray], expected: float) -> None:
-    assert area(trimmed(sheet(), *circles)) == pytest.approx(expected, rel=2e-3)
+    for spans in (1, 5):
+        assert area(trimmed(sheet(spans), *circles)) == pytest.approx(expected, rel=2e-3)
+
+
+def test_cells_that_are_cut_and_whole_ones_share_their_points() -> None:
+    """A side of one triangle alone is on a curve or on the border."""
+    mesh = read(trimmed(sheet(6), circle(1.5), circle(0.5, clockwise=True), circle(1.0, (4.0, 4.0)))).mesh
+    sides = np.sort(mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    found, times = np.unique(sides, axis=0, return_counts=True)
+    x, y = mesh.points[found[times == 1]].mean(axis=1)[:, :2].T
+    around = np.hypot(x - 2.0, y - 2.0)
+    on_curve = np.min(np.abs([around - 1.5, around - 0.5, np.hypot(x - 4.0, y - 4.0) - 1.0]), axis=0) < 0.01
+    assert times.max() == 2 and (on_curve | (x > 4.0 - 1e-6) | (y > 4.0 - 1e-6)).all()
 
 
 def test_a_trim_of_several_curves_is_exact_where_they_are_lines() -> None:

@@ -50,22 +50,67 @@ def read_loops(patch: UsdGeom.NurbsPatch, time: Usd.TimeCode) -> list[Array]:
 def inside(loops: list[Array], us: Array, vs: Array) -> tuple[Array, NDArray[np.int32]]:
     """Of a patch that is sampled at `us` (M,) times `vs` (N,): points (P, 2), u and v, and triangles (T, 3) of them.
 
-    The triangles cover what is inside the loops, and have the loops as edges.
+    The triangles cover what is inside the loops, and have the loops as edges. Cells that no loop comes near are whole.
     """
-    from scipy.spatial import Delaunay, cKDTree  # few stages have patches
-
     rows, columns = np.arange(len(vs), dtype=float), np.arange(len(us), dtype=float)
     traced = [_no_longer(np.column_stack([_at(us, columns, loop[:, 0]), _at(vs, rows, loop[:, 1])])) for loop in loops]
-    edge = np.concatenate(traced).clip(0.0, (columns[-1], rows[-1]))
-    samples = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
-    on_border = ((samples == 0.0) | (samples == samples[-1])).any(axis=1)
-    apart = cKDTree(edge).query(samples)[0] > np.where(on_border, 0.0, _BESIDE)
-    points = np.unique(np.concatenate([edge, samples[apart]]).round(9), axis=0)
+    edge = np.unique(np.concatenate(traced).clip(0.0, (columns[-1], rows[-1])).round(9), axis=0)
+    samples = np.stack(np.meshgrid(columns, rows), axis=-1)
+    near = _near(edge, (len(vs) - 1, len(us) - 1))
+    triangles = np.concatenate([_whole(near, traced), _along(edge, samples, near, traced)])
+    used, drawn = np.unique(triangles, return_inverse=True)
+    points = np.concatenate([samples.reshape(-1, 2), edge])[used]
+    at = np.column_stack([np.interp(points[:, 0], columns, us), np.interp(points[:, 1], rows, vs)])
+    return at, drawn.reshape(triangles.shape).astype(np.int32)
+
+
+def _near(edge: Array, shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """Of the cells (N − 1, M − 1) between samples those that hold points of loops (E, 2), and those around them.
+
+    A loop is a cell away from all others, which is why Delaunay's triangles have the sides between the two as edges.
+    """
+    column, row = np.minimum(edge.astype(int), np.subtract(shape[::-1], 1)).T
+    held = np.zeros((shape[0] + 2, shape[1] + 2), bool)
+    for down, right in np.ndindex(3, 3):
+        held[row + down, column + right] = True
+    return held[1:-1, 1:-1]
+
+
+def _whole(near: NDArray[np.bool_], loops: list[Array]) -> NDArray[np.intp]:
+    """(T, 3) samples, numbered row by row: of the cells inside the loops that are not near any, halved.
+
+    Between cells that are near, those of a row are all inside or all outside.
+    """
+    far = ~near
+    first = far & ~np.pad(far, ((0, 0), (1, 0)))[:, :-1]
+    row, column = np.nonzero(first)
+    inside_run = np.append(_enclosed(np.column_stack([column + 0.5, row + 0.5]), loops), False)
+    run = np.cumsum(first).reshape(far.shape) - 1
+    row, column = np.nonzero(far & inside_run[run])
+    across = near.shape[1] + 1
+    corner = row * across + column
+    halves = np.array([[0, 1, across + 1], [0, across + 1, across]])
+    return (corner[:, None, None] + halves).reshape(-1, 3)
+
+
+def _along(edge: Array, samples: Array, near: NDArray[np.bool_], loops: list[Array]) -> NDArray[np.intp]:
+    """(T, 3) of the samples (N, M, 2), and of `edge` after them: what of the cells `near` is inside the loops."""
+    from scipy.spatial import Delaunay, cKDTree  # few stages have patches
+
+    beside = np.pad(near, 1)
+    corners = beside[1:, 1:] | beside[:-1, 1:] | beside[1:, :-1] | beside[:-1, :-1]
+    on_border = ((samples == 0.0) | (samples == samples[-1, -1])).any(axis=-1)[corners]
+    apart = cKDTree(edge).query(samples[corners])[0] > np.where(on_border, 1e-9, _BESIDE)
+    points = np.concatenate([samples[corners][apart], edge])
+    numbers = np.concatenate([np.flatnonzero(corners)[apart], np.arange(len(edge)) + corners.size])
     triangles = Delaunay(points).simplices
-    corners = points[triangles]
-    (a, b), (c, d) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
-    drawn = triangles[(a * d - b * c > 1e-9) & _enclosed(corners.mean(axis=1), traced)]
-    return np.column_stack([np.interp(points[:, 0], columns, us), np.interp(points[:, 1], rows, vs)]), drawn
+    placed = points[triangles]
+    (a, b), (c, d) = (placed[:, 1] - placed[:, 0]).T, (placed[:, 2] - placed[:, 0]).T
+    centre = placed.mean(axis=1)
+    column, row = np.minimum(centre.astype(int), np.subtract(near.shape[::-1], 1)).T
+    kept = (a * d - b * c > 1e-9) & near[row, column]
+    kept[kept] = _enclosed(centre[kept], loops)
+    return numbers[triangles[kept]]
 
 
 def _values(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> NDArray[Any]:
