@@ -13,6 +13,8 @@ A command is imported when it is called for, and a driver or a foreign library b
 from __future__ import annotations
 
 import difflib
+import gc
+import os
 import sys
 from importlib import import_module
 
@@ -66,6 +68,7 @@ def defshade(context: click.Context) -> None:
 
 def main() -> None:
     """Run the program and leave with its exit code: an error is one sentence on stderr, a bug a traceback."""
+    _spare_the_processor()
     try:
         status = defshade.main(prog_name="defshade", standalone_mode=False)
     except click.Abort:
@@ -75,6 +78,15 @@ def main() -> None:
     except DefshadeError as error:
         _leave(str(error), error.exit_code)
     sys.exit(status)
+
+
+def _spare_the_processor() -> None:
+    """Before libraries are loaded: no threads that wait for NumPy's matrices in loops, and fewer searches for cycles.
+
+    Matrices here are small, and most objects of a start stay.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    gc.set_threshold(20_000, 20, 20)
 
 
 def _sentence(error: click.ClickException) -> str:
