@@ -53,6 +53,13 @@ def test_every_type_of_two_floats_is_read(type_name: str) -> None:
     np.testing.assert_array_equal(read(mesh).mesh.uvs["map1"], XY)
 
 
+@pytest.mark.parametrize("type_name", ["texCoord3f[]", "texCoord3d[]", "texCoord3h[]"])
+def test_of_three_coordinates_the_first_two_count(type_name: str) -> None:
+    mesh = pair()
+    set_primvar(mesh, "map1", [Gf.Vec3f(*map(float, uv), 9.0) for uv in XY], "vertex", type_name)
+    np.testing.assert_array_equal(read(mesh).mesh.uvs["map1"], XY)
+
+
 def test_points_stay_shared_where_the_corners_at_each_agree() -> None:
     mesh = pair()
     set_primvar(mesh, "st", floats2(XY[CORNERS]), "faceVarying", "texCoord2f[]")

@@ -20,9 +20,9 @@ DISPLAY_COLOR = "displayColor"
 Elements = Mapping[str, int]
 """How many values each interpolation needs."""
 
-_UV_TYPES = tuple(
-    Sdf.ValueTypeNames.Find(name) for name in ("texCoord2f", "texCoord2d", "texCoord2h", "float2", "double2", "half2")
-)
+_UV_WIDTHS = {Sdf.ValueTypeNames.Find(f"texCoord{width}{kind}"): width for width in (2, 3) for kind in "fdh"}
+_UV_WIDTHS |= {Sdf.ValueTypeNames.Find(name): 2 for name in ("float2", "double2", "half2")}
+"""Numbers a value of what may be texture coordinates. Of three the first two count."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +81,8 @@ def find_primvars(prim: Usd.Prim) -> dict[str, UsdGeom.Primvar]:
 
 
 def may_be_uvs(primvar: UsdGeom.Primvar) -> bool:
-    """Texture coordinates have two floats a value."""
-    return primvar.GetTypeName().scalarType in _UV_TYPES
+    """Does it have a type that texture coordinates have?"""
+    return primvar.GetTypeName().scalarType in _UV_WIDTHS
 
 
 def read_carried(
@@ -94,8 +94,14 @@ def read_carried(
         return NOTHING_CARRIED
     colors = _fit_finite(authored(found.get(color), time), 3, elements, issues)
     opacity = _fit_finite(authored(found.get("displayOpacity"), time), 1, elements, issues)
-    uvs = {n: _fit_finite(authored(p, time), 2, elements, issues) for n, p in found.items() if may_be_uvs(p)}
+    uvs = {n: _read_uvs(p, time, elements, issues) for n, p in found.items() if may_be_uvs(p)}
     return Carried(colors, opacity, {name: primvar for name, primvar in uvs.items() if primvar is not None})
+
+
+def _read_uvs(primvar: UsdGeom.Primvar, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> Primvar | None:
+    width = _UV_WIDTHS[primvar.GetTypeName().scalarType]
+    uvs = _fit_finite(authored(primvar, time), width, elements, issues)
+    return uvs if uvs is None or width == 2 else replace(uvs, values=uvs.values[:, :2])
 
 
 def read_display(
