@@ -17,6 +17,11 @@ SHADERS = _folder("shaders")
 SCENES = _folder("scenes")
 
 
+def cache_folder(kind: str) -> Path:
+    """Where what can be made again is kept, by the XDG Base Directory Specification."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "defshade" / kind
+
+
 def core_count() -> int:
     """The cores that this process may use."""
     return len(os.sched_getaffinity(0))

@@ -10,7 +10,8 @@ import pytest
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.colour import display_transform, displays
-from defshade_cli.image.display_shader import display_shader
+from defshade_cli.image.display_shader import DisplayShader, display_shader
+from defshade_cli.image.display_table import bake, kept_table
 from defshade_cli.image.ocio import find_render_space
 from defshade_cli.passes.display import DisplayPass
 from defshade_cli.rendering import pictures, run
@@ -71,8 +72,35 @@ def test_rows_that_stay_are_not_shown_again(gpu: Gpu, monkeypatch: pytest.Monkey
     assert drawn == [48, 2, 20]
 
 
+def test_a_table_is_within_half_a_step_where_it_is_used(gpu: Gpu) -> None:
+    """Colours of fourteen stops, saturated and not: half a step, and half that rounding takes. The rest is exact."""
+    shader = display_shader(display_transform())
+    assert shader is not None
+    exact, rng = DisplayPass(gpu, shader), np.random.default_rng(5)
+    table = bake(lambda pixels: exact.show(pixels, straight=False))
+    brightness, saturation = np.exp2(rng.uniform(-10, 4, (400, 500, 1))), rng.choice([0.2, 1.0, 3.0], (400, 1, 1))
+    pixels = (brightness * rng.random((400, 500, 3)) ** saturation).astype(np.float32)
+    pixels[0], pixels[1] = -pixels[0], 300.0 * (1.0 + pixels[1])
+    shown = DisplayPass(gpu, shader, table).show(pixels, straight=False, in_bytes=True)
+    np.testing.assert_allclose(shown / 255.0, exact.show(pixels, straight=False), atol=1.0 / 255.0)
+    np.testing.assert_array_equal(shown[:2], exact.show(pixels[:2], straight=False, in_bytes=True))
+    assert (table[:-1, :-1, :-1, 3] > 0.0).mean() < 0.06
+
+
+def test_a_table_is_baked_once_and_only_where_it_can_be_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shader, baked = DisplayShader("vec4 display(vec4 color) { return color; }", ()), []
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    for _ in range(2):
+        table = kept_table(shader, lambda pixels: baked.append(len(pixels)) or np.clip(pixels, 0.0, 1.0))
+    assert len(baked) == 1 and table is not None and table.shape == (65, 65, 65, 4)
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    assert kept_table(shader, lambda pixels: pixels) is None
+
+
 def test_large_pictures_are_shown_by_the_device(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same picture either way, in formats with alpha and without; half a step of 8 bits may round either way."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     (tmp_path / "ball.usda").write_text('#usda 1.0\ndef Sphere "ball" {}\ndef DistantLight "sun" {}\n')
     shown = {}
     for least in (0, 10**9):

@@ -12,25 +12,32 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.shaders import set_uniforms
 from defshade_cli.gpu.targets import allocate
 from defshade_cli.image.colour import BRIGHTEST, Pixels
+from defshade_cli.image.display_table import CELLS, MOST, TOE, Lattice
 from defshade_cli.passes.screen import Screen
 
 if TYPE_CHECKING:
-    from defshade_cli.image.display_shader import DisplayShader, Table
+    from defshade_cli.image.display_shader import DisplayShader
 
 _BAND = 2**19
 """Pixels shown at a time."""
 
+_MIDDLE = 0.5
+"""A depth between those that the table's shader writes: 0 where the transform itself is wanted, else 1."""
+
+_BY_TABLE = '#include "lib/display_table.glsl"'
+_DEFINES = (f"TABLE_CELLS {CELLS}", f"TABLE_TOE {TOE}", f"TABLE_MOST {MOST}")
+
+Texture = moderngl.Texture | moderngl.Texture3D
+
 
 class DisplayPass:
-    """Compiled for one transform."""
+    """Compiled for one transform. table: of the same, for pictures in bytes, as far as it is near enough."""
 
-    def __init__(self, gpu: Gpu, shader: DisplayShader) -> None:
+    def __init__(self, gpu: Gpu, shader: DisplayShader, table: Lattice | None = None) -> None:
         self._gpu = gpu
-        generated = {"generated/display.glsl": shader.source}
-        self._program = gpu.shaders.program("screen.vert", "display.frag", generated=generated)
-        self._screen = Screen(gpu)
-        self._array = self._screen.array(self._program)
-        self._tables = {table.sampler: _texture(gpu, table) for table in shader.tables}
+        tables = {each.sampler: _texture(gpu, each.values, smooth=each.smooth) for each in shader.tables}
+        self._exact = _Shader(gpu, shader.source, tables)
+        self._table = None if table is None else _Shader(gpu, _BY_TABLE, {"table": _texture(gpu, table, smooth=True)})
         self._last: dict[tuple[str, bool, bool], tuple[Pixels, NDArray[Any]]] = {}
 
     def show(
@@ -56,31 +63,53 @@ class DisplayPass:
         self._gpu.make_current()
         height, width, channels = pixels.shape
         rows = min(max(_BAND // width, 1), height)
-        target = allocate(self._gpu, (width, rows), {"shown": (4, "f1" if in_bytes else "f4")})
+        table = self._table if in_bytes else None
+        depth = self._gpu.depth_texture((width, rows)) if table else None
+        target = allocate(self._gpu, (width, rows), {"shown": (4, "f1" if in_bytes else "f4")}, depth)
         image = self._gpu.context.texture((width, rows), channels, dtype="f4")
-        image.use(0)
-        set_uniforms(self._program, {"image": 0, "straight": straight, "brightest": BRIGHTEST})
-        for unit, (name, table) in enumerate(self._tables.items(), 1):
-            table.use(unit)
-            self._program[name] = unit
-        target.framebuffer.use()
-        self._gpu.context.enable_only(moderngl.NOTHING)
         shown = np.empty(pixels.shape, np.uint8 if in_bytes else np.float32)
         for top in range(0, height, rows):
             band = np.ascontiguousarray(pixels[top : top + rows])
             image.write(band, viewport=(0, 0, width, len(band)))
-            self._screen.draw(self._array)
+            target.framebuffer.use()
+            if table:
+                table.draw(image, straight, depth="1")
+            self._exact.draw(image, straight, depth=">" if table else None)
             shown[top : top + rows] = target.read("shown")[: len(band), :, :channels]
-        image.release()
         target.release()
+        for texture in filter(None, (image, depth)):
+            texture.release()
         return shown
 
 
-def _texture(gpu: Gpu, table: Table) -> moderngl.Texture | moderngl.Texture3D:
-    *shape, channels = table.values.shape
-    make = gpu.context.texture if len(shape) == 2 else gpu.context.texture3d
-    texture = gpu.keep(make(tuple(reversed(shape)), channels, np.ascontiguousarray(table.values).tobytes(), dtype="f4"))
-    texture.filter = (moderngl.LINEAR, moderngl.LINEAR) if table.smooth else (moderngl.NEAREST, moderngl.NEAREST)
+class _Shader:
+    """display.frag with what it reads. source: GLSL with `vec4 display(vec4 color)`."""
+
+    def __init__(self, gpu: Gpu, source: str, tables: dict[str, Texture]) -> None:
+        self._context, self._screen, self._tables = gpu.context, Screen(gpu), tables
+        generated = {"generated/display.glsl": source}
+        self._program = gpu.shaders.program("screen.vert", "display.frag", defines=_DEFINES, generated=generated)
+        self._array = self._screen.array(self._program)
+
+    def draw(self, image: moderngl.Texture, straight: bool, depth: str | None) -> None:
+        """depth: how a depth in the middle is compared with what is stored, if it is."""
+        self._context.enable_only(moderngl.DEPTH_TEST if depth else moderngl.NOTHING)
+        if depth:
+            self._context.depth_func = depth
+        for unit, (name, texture) in enumerate({"image": image, **self._tables}.items()):
+            texture.use(unit)
+            self._program[name] = unit
+        set_uniforms(self._program, {"straight": straight, "brightest": BRIGHTEST, "screen_depth": _MIDDLE})
+        self._screen.draw(self._array)
+
+
+def _texture(gpu: Gpu, values: NDArray[Any], *, smooth: bool) -> Texture:
+    """(H, W, C) or (D, H, W, C)."""
+    *shape, channels = values.shape
+    make = gpu.context.texture if values.ndim == 3 else gpu.context.texture3d
+    data = np.ascontiguousarray(values, np.float32).tobytes()
+    texture = gpu.keep(make(tuple(reversed(shape)), channels, data, dtype="f4"))
+    texture.filter = (moderngl.LINEAR, moderngl.LINEAR) if smooth else (moderngl.NEAREST, moderngl.NEAREST)
     texture.repeat_x = texture.repeat_y = False
     if isinstance(texture, moderngl.Texture3D):
         texture.repeat_z = False

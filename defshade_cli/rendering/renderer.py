@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.colour import DisplayTransform
 from defshade_cli.passes.display import DisplayPass
 from defshade_cli.passes.pipeline import Pipeline
+
+if TYPE_CHECKING:
+    from defshade_cli.image.display_shader import DisplayShader
 
 
 class Renderer:
@@ -45,7 +50,7 @@ class Renderer:
             from defshade_cli.image.display_shader import display_shader
 
             shader = display_shader(transform)
-            self._displays[device, transform] = DisplayPass(self._gpus[device], shader) if shader else None
+            self._displays[device, transform] = _display(self._gpus[device], shader) if shader else None
         return self._displays[device, transform]
 
     def close(self) -> None:
@@ -53,3 +58,12 @@ class Renderer:
         for kept in (self._gpus, self._pipelines, self._displays):
             kept.clear()
         self._stack.close()
+
+
+def _display(gpu: Gpu, shader: DisplayShader) -> DisplayPass:
+    """With a table, where one is kept or can be."""
+    from defshade_cli.image.display_table import kept_table
+
+    exact = DisplayPass(gpu, shader)
+    table = kept_table(shader, lambda pixels: exact.show(pixels, straight=False).astype(np.float32))
+    return exact if table is None else DisplayPass(gpu, shader, table)

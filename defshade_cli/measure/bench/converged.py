@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +15,7 @@ from defshade_cli.image.files import write
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import BEAUTY
 from defshade_cli.image.reading import read
+from defshade_cli.resources import cache_folder
 from defshade_cli.settings import OutputSettings, RenderJob
 
 
@@ -34,7 +34,7 @@ def converged(job: RenderJob, frame: float | None, draw: Callable[[], Film]) -> 
     Raises OutputError where it cannot be kept, and what `draw` raises; UsageError as write.
     """
     made_of = Fingerprint(replace(job, output=_OUTPUT)).of(frame)
-    path = cache_folder() / f"{job.stage.stem}.{made_of}.exr" if made_of else None
+    path = cache_folder("converged") / f"{job.stage.stem}.{made_of}.exr" if made_of else None
     if path is not None and path.exists():
         return from_file(path)
     film = draw()
@@ -49,11 +49,6 @@ def from_file(path: Path) -> Converged:
     if BEAUTY not in layers:
         raise OutputError(f"{path}: no beauty to count errors against, only {', '.join(layers)}")
     return Converged(layers[BEAUTY][..., :3], path)
-
-
-def cache_folder() -> Path:
-    """By the XDG Base Directory Specification."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "defshade" / "converged"
 
 
 _OUTPUT = OutputSettings(full_float=True)
