@@ -29,7 +29,7 @@ from defshade_cli.usd.point_instancer import has_varying_copies, read_point_inst
 from defshade_cli.usd.render_pass import PassRules
 from defshade_cli.usd.said import Said, said_of
 from defshade_cli.usd.values import STANDS_NOWHERE
-from defshade_cli.usd.xform import gf_matrix, matrix
+from defshade_cli.usd.xform import IDENTITY, gf_matrix, matrix
 
 if TYPE_CHECKING:
     from defshade_cli.usd.skel import Rig
@@ -130,7 +130,8 @@ class Traversal:
         root_from_prim, in_world, purpose, _, rig, proxied, _ = above
         if _XFORM_OPS in said.names:
             local, resets = self._memory.xforms.GetLocalTransformation(prim)
-            root_from_prim, in_world = (local, True) if resets else (local * root_from_prim, in_world)
+            in_world |= resets
+            root_from_prim = local if resets or root_from_prim is IDENTITY else local * root_from_prim
         if _PURPOSE in said.names:
             authored = prim.GetAttribute(_PURPOSE)
             purpose = str(authored.Get()) if authored.HasAuthoredValue() else purpose
