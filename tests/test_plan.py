@@ -116,3 +116,9 @@ def test_shadow_maps_are_coarser_the_more_there_are(lights: int, side: int) -> N
     """Each bulb sees all around by six maps; a sample draws some 64 million texels, until maps are the coarsest."""
     plan = make_plan(replace(SCENE, lights=(bulb(0, 0, 0.5),) * lights), RenderSettings())
     assert plan.shadow_resolution == side
+
+
+@pytest.mark.parametrize(("samples", "side"), [(1, 1024), (2, 512), (15, 512), (16, 1024)])
+def test_shadow_maps_of_a_few_samples_are_coarser(samples: int, side: int) -> None:
+    plan = make_plan(replace(SCENE, lights=(bulb(0, 0, 0.5),)), RenderSettings(samples=samples))
+    assert plan.shadow_resolution == side

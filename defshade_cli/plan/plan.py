@@ -211,7 +211,7 @@ class Plan:
     @property
     def shadow_resolution(self) -> int:
         """Texels along the side of each shadow map."""
-        return shadow_resolution(self.lights)
+        return shadow_resolution(self.lights, self.samples)
 
     @property
     def maps_a_sample(self) -> int:
