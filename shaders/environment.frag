@@ -87,7 +87,7 @@ void main() {
         alpha = 1.0;
     }
 #endif
-#ifndef SKY_RAYS
+#ifndef LOBE_RAYS
     if (covered) lit.radiance = view.exposure * reflected_sky(read_planes(pixel), v, lit.diffuse);
 #endif
 #ifdef SPLIT

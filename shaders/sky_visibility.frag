@@ -25,7 +25,7 @@ void main() {
     vec3 position = position_at(gl_FragCoord.xy, camera_depth(stored));
     vec3 l;
     vec3 irradiance = irradiance_from(light, position, l);
-    float widening = patch_alpha_squared(light, position, l);
+    float widening = patch_alpha_squared(patch_solid_angle(light, position, l));
     s.roughness = widened_roughness(s.roughness, widening);
     s.clearcoat_roughness = widened_roughness(s.clearcoat_roughness, widening);
     vec3 v = direction_to_eye(position);

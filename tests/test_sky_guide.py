@@ -28,7 +28,8 @@ def pipeline(gpu: Gpu) -> Pipeline:
 
 def directions(pipeline: Pipeline, of: Scene, rays: int = 0) -> np.ndarray:
     """(1024, 3) world space."""
-    plan = replace(scout(make_plan(of, RenderSettings(size=(64, 64), samples=4))), sky_rays=rays)
+    plan = scout(make_plan(of, RenderSettings(size=(64, 64), samples=4)))
+    plan = replace(plan, lights=tuple(replace(planned, by_rays=rays > 0) for planned in plan.lights))
     density = sky_guides(pipeline.planes(of, plan), plan)[SKY]
     drawn = [uniform_environment().sample(owen_sobol(i, 1), density)[0] for i in range(1024)]
     return np.array(drawn) @ SKY.world_from_light[:3, :3].T

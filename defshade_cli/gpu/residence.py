@@ -22,7 +22,21 @@ from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.texture import Texture
 
-VIEW, INSTANCES, MATERIALS, LIGHTS, LIGHT_LISTS, TEXTURE_INPUTS, TILES, LINKS, MOTIONS, BOXES, TRIANGLES = range(11)
+(
+    VIEW,
+    INSTANCES,
+    MATERIALS,
+    LIGHTS,
+    LIGHT_LISTS,
+    TEXTURE_INPUTS,
+    TILES,
+    LINKS,
+    MOTIONS,
+    BOXES,
+    TRIANGLES,
+    LAMPS,
+    CELLS,
+) = range(13)
 """Binding points of the storage buffers, as the shaders declare them."""
 
 LIGHT_BLOCK, SHADOW_BLOCK = range(2)

@@ -63,7 +63,7 @@ def _emitters(
         return [direction.shared_by(plan.samples) for direction in directions]
     if plan.samples * planned.points == 1:
         return [far_field(light)]
-    towards = extent.receivers.mean(axis=0) + plan.camera.position
+    towards = middle_of(extent, plan)
     places = [sample.on_light(number, k, planned.points) for k in range(planned.points)]
     points = [emitter_at(light, u, towards, inside=planned.is_empty) for u in places]
     if isinstance(light, RectLight) and light.radiance_map:
@@ -78,6 +78,11 @@ def _mean_weight(shown: RadianceMap, number: int, points: int, count: int) -> ND
     drawn = [shown.sample(s.on_light(number, k, points)[:2])[1] for s in samples(count) for k in range(points)]
     mean = np.mean(drawn, axis=0)
     return np.where(mean > 0.0, mean, 1.0)
+
+
+def middle_of(extent: ShadowExtent, plan: Plan) -> NDArray[np.float64]:
+    """(3,) world space: of what is lit, which some lights' points turn to."""
+    return np.asarray(extent.receivers.mean(axis=0) + plan.camera.position)
 
 
 def shadow_extent(bounds: NDArray[np.float64], plan: Plan) -> ShadowExtent:

@@ -48,14 +48,14 @@ class EnvironmentVariant:
     def of(cls, plan: Plan, dome: PlannedLight) -> EnvironmentVariant:
         """What the shader of a dome must know of the plan."""
         orthographic = plan.camera.projection == "orthographic"
-        shows = dome.points == 0, plan.background, plan.hides_sky(dome), plan.sky_rays > 0
+        shows = dome.points == 0, plan.background, plan.hides_sky(dome), dome.by_rays
         return cls(plan.planes, plan.layout, orthographic, *shows, plan.outputs, plan.most_groups, plan.render_space)
 
     @property
     def defines(self) -> list[str]:
         """The shader's macros."""
         flags = ["ORTHOGRAPHIC"] * self.orthographic + ["ANALYTIC"] * self.analytic + ["BACKGROUND"] * self.background
-        flags += ["OCCLUSION"] * self.occlusion + ["SKY_RAYS"] * self.rays
+        flags += ["OCCLUSION"] * self.occlusion + ["LOBE_RAYS"] * self.rays
         return (
             [plane.define for plane in self.planes] + flags + space_defines(self.space) + output_defines(self.outputs)
         )

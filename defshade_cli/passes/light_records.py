@@ -36,7 +36,8 @@ def light_records(
     if not len(records):
         return records
     places = np.array([emitter.position for emitter in emitters])
-    aside = np.linalg.norm(places - [planned.light.position for planned in lights], axis=1)
+    centres = np.array([planned.light.position for planned in lights])
+    aside = np.linalg.norm(places - centres, axis=1)
     columns = {
         "position": places - eye,
         "axis": [emitter.axis for emitter in emitters],
@@ -46,6 +47,9 @@ def light_records(
         "extent": [emitter.extent for emitter in emitters],
         "reach": np.array([planned.reach for planned in lights]) + aside,
         "response": [(planned.light.diffuse, planned.light.specular) for planned in lights],
+        "radius": [emitter.radius for emitter in emitters],
+        "centre": centres - eye,
+        "by_rays": [planned.by_rays for planned in lights],
         "is_sky": [planned.light.kind == "dome" for planned in lights],
         "first_link": [tables.links.lights.get(planned.light, ALL_LINKED) for planned in lights],
         "cone_angle": NO_CONE,

@@ -20,10 +20,10 @@ from defshade_cli.passes.light_records import NO_CONE, NO_IES
 Traits = tuple[tuple[str, str], ...]
 """(field of the Light record, its GLSL literal) of each."""
 
-_CHOOSING = ("profile", "shadow_count", "is_sky")
+_CHOOSING = ("profile", "shadow_count", "is_sky", "by_rays")
 """Fields of a few values, each with its own code."""
 
-_UNUSED = {"extent": 0.0, "focus": 0.0, "cone_angle": NO_CONE, "reach": np.inf}
+_UNUSED = {"extent": 0.0, "radius": 0.0, "focus": 0.0, "cone_angle": NO_CONE, "reach": np.inf}
 """Values with which a light has no use for some code."""
 
 

@@ -34,7 +34,7 @@ class LightingVariant:
     responses: some light shows in one lobe more than in the other.
     shaped: cones, focus or profiles of IES.  profiles: some point does not shine alike all around.
     patches: points stand for some area of their light, and samples for some of their pixel.
-    sky: points of a dome.  sky_rays: lobes see it by rays too.
+    sky: points of a dome.  lobe_rays: lobes see some light by rays too.
     volumes: the kinds that some light has.  outputs: layers beside the radiance.  groups: those that one light is in.
     """
 
@@ -50,7 +50,7 @@ class LightingVariant:
     profiles: bool
     patches: bool
     sky: bool
-    sky_rays: bool
+    lobe_rays: bool
     volumes: tuple[Volume, ...]
     outputs: tuple[str, ...] = ()
     groups: int = 0
@@ -81,7 +81,7 @@ class LightingVariant:
             patches or any(light.profile != "uniform" for light in lights),
             patches,
             patches and any(light.kind == "dome" for light in lights),
-            plan.sky_rays > 0,
+            any(planned.by_rays for planned in chosen),
             tuple(dict.fromkeys(planned.volume for planned in chosen)),
             plan.outputs,
             max((len(planned.groups) for planned in chosen), default=0),
@@ -102,7 +102,7 @@ class LightingVariant:
             + ["PROFILES"] * self.profiles
             + ["PATCHES"] * self.patches
             + ["SKY"] * self.sky
-            + ["SKY_RAYS"] * (self.sky and self.sky_rays)
+            + ["LOBE_RAYS"] * self.lobe_rays
             + space_defines(self.space)
         )
         return [plane.define for plane in self.planes] + flags + output_defines(self.outputs)

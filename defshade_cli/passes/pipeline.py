@@ -16,7 +16,7 @@ from defshade_cli.image.film import Film, Sampling
 from defshade_cli.passes.accumulation import AccumulationPass
 from defshade_cli.passes.debug_volumes import DebugVolumesPass, laid_over
 from defshade_cli.passes.emission import EmissionPass
-from defshade_cli.passes.emitters import LitSample, light_batches
+from defshade_cli.passes.emitters import LitSample, light_batches, middle_of, shadow_extent
 from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
@@ -27,6 +27,7 @@ from defshade_cli.passes.light_tiles import LightTiles
 from defshade_cli.passes.light_whole import WholeLighting
 from defshade_cli.passes.lighting import LightingPass, LightingVariant
 from defshade_cli.passes.linking import ALL_LINKED
+from defshade_cli.passes.lobe_rays import LampRaysPass, LampStore, LobeRays, SkyRaysPass, TreeStore, sky_densities
 from defshade_cli.passes.motion import motion_records, neighbouring_points
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
@@ -34,7 +35,6 @@ from defshade_cli.passes.screen import WHOLE, Screen, TileMask
 from defshade_cli.passes.shadow_atlas import ShadowAtlas
 from defshade_cli.passes.shadows import ShadowPass, ShadowVariant
 from defshade_cli.passes.sky_guide import NO_GUIDES, SkyGuides, scout, sky_guides
-from defshade_cli.passes.sky_rays import SkyRays, SkyRaysPass, TreeStore, sky_densities
 from defshade_cli.passes.sky_textures import SkyTextures
 from defshade_cli.passes.sky_visibility import SkyVisibility, SkyVisibilityPass
 from defshade_cli.passes.stopping import Stopping
@@ -49,13 +49,13 @@ Layers = dict[str, NDArray[np.float32]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Canvas:
-    """What the samples of a frame are lit on, and what is known of its domes' skies."""
+    """What the samples of a frame are lit on, what is known of its domes' skies, and what rays along lobes read."""
 
     gbuffer: GBuffer
     targets: LightTargets
     visibility: SkyVisibility | None
     guides: SkyGuides
-    rays: SkyRays | None
+    rays: LobeRays | None
 
 
 class Pipeline:
@@ -70,7 +70,7 @@ class Pipeline:
         self._lights = RecordBuffer(gpu, LIGHTS)
         self._motions = RecordBuffer(gpu, MOTIONS)
         self._screen, self._mask = Screen(gpu), TileMask(gpu)
-        self._skies, self._trees = SkyTextures(gpu), TreeStore(gpu)
+        self._skies, self._trees, self._lamps = SkyTextures(gpu), TreeStore(gpu), LampStore(gpu)
         self._gbuffer_pass = cache(lambda variant: GBufferPass(gpu, variant))
         self._emission_pass = cache(lambda variant: EmissionPass(gpu, variant, self._screen))
         self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant, self._screen))
@@ -78,6 +78,7 @@ class Pipeline:
         self._sky_rays_pass = cache(
             lambda variant, hidden: SkyRaysPass(gpu, variant, self._screen, self._skies, hidden=hidden)
         )
+        self._lamp_rays_pass = cache(lambda variant, hidden: LampRaysPass(gpu, variant, self._screen, hidden=hidden))
         self._sky_visibility_pass = cache(lambda variant: SkyVisibilityPass(gpu, variant, self._screen))
         self._shadow_pass = cache(lambda variant: ShadowPass(gpu, variant))
         self._light_tiles = LightTiles(gpu, self._frame)
@@ -166,8 +167,8 @@ class Pipeline:
         targets.clear()
         hidden = any(plan.hides_sky(dome) for dome in plan.domes)
         visibility = SkyVisibility.of(self._frame, plan.size) if hidden else None
-        canvas = _Canvas(gbuffer, targets, visibility, guides, self._sky_rays(scene, plan, guides))
         tables = self._tables.update(plan)
+        canvas = _Canvas(gbuffer, targets, visibility, guides, self._lobe_rays(scene, plan, guides, tables))
         self._accumulation.begin(plan.size, plan.samples)
         self._stopping.begin(plan)
         for sample in samples(plan.samples, plan.filter, plan.filter_width):
@@ -176,8 +177,9 @@ class Pipeline:
                 draws = self._scene.update(scene, plan.inputs, texels=plan.texels, thin=plan.thin)
                 tables = self._tables.update(plan)
                 mattes.see(scene)
-                if canvas.rays and canvas.rays.tree:
-                    canvas = replace(canvas, rays=replace(canvas.rays, tree=self._trees.update(scene)))
+                if canvas.rays:
+                    canvas.rays.release()
+                canvas = replace(canvas, rays=self._lobe_rays(scene, plan, guides, tables))
             self._draw_gbuffer(draws, plan, gbuffer, sample)
             if plan.mattes:
                 mattes.add(gbuffer.target.read("visible"))
@@ -231,16 +233,23 @@ class Pipeline:
             environment = self._environment_pass(EnvironmentVariant.of(plan, dome))
             first_link = tables.links.lights.get(dome.light, ALL_LINKED)
             environment.draw(dome, gbuffer, targets, visibility, first_link)
-            if canvas.rays:
-                lobes = self._sky_rays_pass(LightingVariant.of(plan), plan.shadows_sky(dome))
+            if canvas.rays and dome.by_rays:
+                lobes = self._sky_rays_pass(variant, plan.shadows_sky(dome))
                 lobes.draw(dome, plan, gbuffer, targets, canvas.rays, first_link)
+        if canvas.rays and plan.lamps:
+            self._lights.write(canvas.rays.lamps)
+            lamps = self._lamp_rays_pass(LightingVariant.of(plan, plan.lamps), plan.shadows_lamps)
+            lamps.draw(plan, gbuffer, targets, canvas.rays, tables)
 
-    def _sky_rays(self, scene: Scene, plan: Plan, guides: SkyGuides) -> SkyRays | None:
-        """What rays into domes' skies need, if any are sent."""
-        if not plan.sky_rays:
+    def _lobe_rays(self, scene: Scene, plan: Plan, guides: SkyGuides, tables: LightTables) -> LobeRays | None:
+        """What rays along lobes need, if any are sent."""
+        if not plan.lobe_rays:
             return None
-        hidden = any(plan.shadows_sky(dome) for dome in plan.domes)
-        return SkyRays(sky_densities(plan, guides, self._skies), self._trees.update(scene) if hidden else None)
+        hidden = plan.shadows_lamps or any(plan.shadows_sky(dome) and dome.by_rays for dome in plan.domes)
+        extent = shadow_extent(scene.bounds - plan.camera.position, plan)
+        lamps = self._lamps.update(plan, middle_of(extent, plan), tables)
+        densities = sky_densities(plan, guides, self._skies)
+        return LobeRays(densities, self._trees.update(scene) if hidden else None, lamps)
 
     def _guides(self, draws: DrawList, plan: Plan) -> SkyGuides:
         """Where in its domes' skies the image looks for light, if samples are drawn there."""

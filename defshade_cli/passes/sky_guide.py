@@ -2,7 +2,7 @@
 
 All pixels share the directions of a sample, so they are drawn where pixels need them: half of them by the sky's
 luminance alone, and half by what some thousand pixels see of it by their diffuse, and in lobes that have no rays of
-their own (passes/sky_rays.py), shadows apart. A smooth metal's pixels look into few directions, where luminance alone
+their own (passes/lobe_rays.py), shadows apart. A smooth metal's pixels look into few directions, where luminance alone
 would send hardly any. Whatever the density, the mean is the same.
 """
 
@@ -49,9 +49,11 @@ def sky_guides(planes: Planes, plan: Plan) -> SkyGuides:
     directions, shares = _looked_along(planes, plan)
     if not len(shares):
         return NO_GUIDES
-    domes = [planned.light for planned in plan.domes if isinstance(planned.light, DomeLight)]
-    parts = _PARTS_BESIDE_RAYS if plan.sky_rays else _PARTS
-    return {dome: _guide(dome, directions, shares, parts) for dome in domes}
+    return {
+        dome.light: _guide(dome.light, directions, shares, _PARTS_BESIDE_RAYS if dome.by_rays else _PARTS)
+        for dome in plan.domes
+        if isinstance(dome.light, DomeLight)
+    }
 
 
 def _guide(dome: DomeLight, directions: Array, shares: Array, parts: Sequence[float]) -> GridDistribution:

@@ -34,7 +34,7 @@ def view_record(plan: Plan, layout: Layout, sample: Sample = CENTRE) -> NDArray[
     view["exposure"] = plan.exposure
     view["sample_index"] = sample.index
     view["sky_share"] = plan.sky_share
-    view["sky_rays"] = plan.sky_rays * plan.samples
+    view["lobe_rays"] = plan.lobe_rays * plan.samples
     view["pixel_share"] = plan.pixel_share
     return view
 

@@ -45,8 +45,7 @@ def explain(plan: Plan) -> Iterator[Decision]:
     yield _kept("IES profiles", bool(plan.profiles), "a light is shaped by one", "no light has one")
     yield _kept("shadow linking", plan.shadow_linked, "a light chooses its casters", "everything casts shadows")
     yield _kept("environment", bool(plan.domes), "a dome lights the scene", "no dome")
-    few = "no dome has directions, or its rays would have to know opacity, links or too many triangles"
-    yield _kept("rays into domes", plan.sky_rays > 0, f"{plan.sky_rays} a sample along sharp lobes", few)
+    yield _explain_rays(plan)
     if plan.portals:
         yield Decision("portals", "passed over", "hints: domes are sampled by their radiance")
     yield _kept("cutout", plan.cutout, "some opacity is or may be below 1", "no opacity is below 1")
@@ -71,6 +70,15 @@ def _explain_shadows(plan: Plan) -> Decision:
         return Decision("shadow maps", "skipped", "no light casts any, or none were asked")
     side = plan.shadow_resolution
     return Decision("shadow maps", f"{side} x {side}", f"{plan.maps_a_sample} a sample at most")
+
+
+def _explain_rays(plan: Plan) -> Decision:
+    if not plan.lobe_rays:
+        few = "no dome, no lamp large enough for the lobes there are, or opacity, linked shadows or too many triangles"
+        return Decision("rays along lobes", "skipped", few)
+    seen = sum(planned.by_rays for planned in plan.lights)
+    reason = f"sharp lobes see {seen} of {len(plan.lights)} lights by them"
+    return Decision("rays along lobes", f"{plan.lobe_rays} a sample", reason)
 
 
 def _explain_subdivision(plan: Plan) -> Decision:

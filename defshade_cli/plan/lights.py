@@ -42,6 +42,7 @@ class PlannedLight:
     is_empty: no geometry lies within a sphere light.
     groups: the layers that sum it.
     points: that stand for the light in each sample; 1 is its far field where there is a single sample.
+    by_rays: lobes see it by rays of each pixel's own as well, see plan/lobe_rays.py.
     """
 
     light: Light
@@ -51,6 +52,7 @@ class PlannedLight:
     is_empty: bool = True
     groups: tuple[str, ...] = ()
     points: int = 1
+    by_rays: bool = False
 
 
 def volume_of(light: Light) -> Volume:

@@ -18,11 +18,11 @@ from defshade_cli.plan.cost import choose_lighting
 from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.groups import light_groups, light_outputs
 from defshade_cli.plan.lights import PlannedLight, plan_lights
+from defshade_cli.plan.lobe_rays import seen_by_rays
 from defshade_cli.plan.moments import count_moments, share_moments
 from defshade_cli.plan.opacity import is_transparent, thin_materials, thin_numbers
-from defshade_cli.plan.points import pixel_share
+from defshade_cli.plan.points import pixel_share, rays_a_sample
 from defshade_cli.plan.shadow_maps import count_maps, shadow_resolution
-from defshade_cli.plan.sky_rays import count_sky_rays
 from defshade_cli.plan.solidity import solid_materials
 from defshade_cli.plan.texels import seen_texels
 from defshade_cli.scene.camera import Camera, image_size
@@ -56,7 +56,7 @@ class Plan:
     planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
     lights: sorted quads, spheres, cones.  lighting: how they are drawn.
     shadows: some light casts them.  shadow_linked: in some light not all geometry does.
-    sky_rays: of a pixel in a sample along its lobes, see plan/sky_rays.py.
+    lobe_rays: of a pixel in a sample, by which lobes see some lights; 0 where they see none so.
     background: domes are seen where no geometry is.
     thin: numbers of the materials whose opacity may be below 1.  transparent: it scales the diffuse of some alone.
     solid: how many have opacity from an image that is 1 where they read it, see plan/solidity.py.
@@ -91,7 +91,7 @@ class Plan:
     lighting: Lighting
     shadows: bool
     shadow_linked: bool
-    sky_rays: int
+    lobe_rays: int
     background: bool
     thin: tuple[int, ...]
     solid: int
@@ -189,6 +189,12 @@ class Plan:
         return tuple(planned for planned in self.lights if isinstance(planned.light, DomeLight))
 
     @property
+    def lamps(self) -> tuple[PlannedLight, ...]:
+        """Those of the lights that have a place or a size, and that lobes see by rays, groups together."""
+        seen = [planned for planned in self.lights if planned.by_rays and not isinstance(planned.light, DomeLight)]
+        return tuple(sorted(seen, key=lambda planned: planned.groups))
+
+    @property
     def sky_share(self) -> float:
         """Of a dome, that one of its directions stands for, four times; 0 where it has none but its analytic term."""
         directions = max((dome.points for dome in self.domes), default=0) * self.samples
@@ -196,12 +202,17 @@ class Plan:
 
     def hides_sky(self, planned: PlannedLight) -> bool:
         """Is it a dome that geometry hides, as far as the directions drawn so far tell? Rays need not ask them."""
-        return self.shadows_sky(planned) and not self.sky_rays
+        return self.shadows_sky(planned) and not planned.by_rays
 
     def shadows_sky(self, planned: PlannedLight) -> bool:
         """Is it a dome with directions that geometry hides?"""
         casts = self.shadows and planned.light.casts_shadow
         return isinstance(planned.light, DomeLight) and planned.points > 0 and casts
+
+    @property
+    def shadows_lamps(self) -> bool:
+        """Does geometry hide some of the lamps?"""
+        return self.shadows and any(planned.light.casts_shadow for planned in self.lamps)
 
     @property
     def shadow_styles(self) -> bool:
@@ -241,6 +252,8 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     lights = _seen_lights(plan_lights(scene, exposure, settings, layers), layers)
     solid = solid_materials(scene)
     thin = thin_materials(scene, solid)
+    if _has_light(layers):
+        lights = seen_by_rays(lights, scene, settings, thin=bool(thin))
     planes, data_planes, data_pass = _divide_planes(scene, settings, layers, thin)
     shadows = settings.shadows and bool(scene.drawables) and any(p.light.casts_shadow for p in lights)
     return Plan(
@@ -267,7 +280,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         lighting=choose_lighting(lights, camera, settings, layers, window.width * window.height),
         shadows=shadows,
         shadow_linked=shadows and scene.shadow_linked,
-        sky_rays=count_sky_rays(lights, scene, settings, thin=bool(thin)) if _has_light(layers) else 0,
+        lobe_rays=rays_a_sample(settings) if any(planned.by_rays for planned in lights) else 0,
         background=settings.background,
         thin=thin_numbers(scene, thin),
         solid=len(solid),

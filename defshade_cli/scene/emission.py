@@ -41,7 +41,8 @@ Vector = NDArray[np.float64]
 Place = tuple[float, float, float]
 """Coordinates in the unit cube."""
 
-_BIAS = 0.8  # of a cylinder's points; at 1 those that face away would bear any intensity, and something may face them
+POINTS_BIAS = 0.8
+"""Of a cylinder's points; at 1 those that face away would bear any intensity, and something may face them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,6 +50,7 @@ class Emitter:
     """position: (3,) world space.  axis: (3,) unit, what shaping is measured from; a distant light's direction.
     facing: (3,) unit, what the profile is measured from.  intensity: (3,) on axis, or a distant light's irradiance.
     extent: world-space area that the point stands for, a distant light's solid angle in steradians; 0 for a point.
+    radius: of the glowing ball around the light's position that the point lies in; 0 for another.
     """
 
     position: Vector
@@ -57,6 +59,7 @@ class Emitter:
     profile: Profile
     intensity: Vector
     extent: float = 0.0
+    radius: float = 0.0
 
     def shared_by(self, samples: int) -> Emitter:
         """One of `samples` points that stand for the light together."""
@@ -75,7 +78,7 @@ class Emitter:
 class _Patch:
     """A point of a light's surface in light space, its unit normal, and the area that it stands for.
 
-    weight: (3,) on the light's mean radiance; its mean over points is 1.
+    weight: (3,) on the light's mean radiance.
     """
 
     point: Vector
@@ -126,9 +129,8 @@ def _within_ball(light: SphereLight, u: Place) -> Emitter:
     x, y = _circle(u[1], light.radius * math.sqrt(u[0]))
     z = light.radius * math.sqrt(1.0 - u[0]) * math.sin(math.pi * (u[2] - 0.5))
     position = transform_points(light.world_from_light, np.array([x, y, z]))
-    return Emitter(
-        position, light.axis, light.axis, "uniform", light.intensity_on_axis, math.pi * light.world_radius**2
-    )
+    radius = light.world_radius
+    return Emitter(position, light.axis, light.axis, "uniform", light.intensity_on_axis, math.pi * radius**2, radius)
 
 
 def _distant(light: DistantLight, u: Place) -> Emitter:
@@ -157,11 +159,11 @@ def _patch(light: Light, u: Place, towards: Vector) -> _Patch | None:
         case RectLight(width=w, height=h, radiance_map=None):
             return _Patch(np.array([(u[0] - 0.5) * w, (u[1] - 0.5) * h, 0.0]), _FORWARD, w * h)
         case RectLight(width=w, height=h, radiance_map=RadianceMap() as shown):
-            (s, t), weight = shown.sample(u[:2])  # its top left is at (+X, +Y)
-            return _Patch(np.array([(0.5 - s) * w, (0.5 - t) * h, 0.0]), _FORWARD, w * h, weight)
+            (s, t), weight, density = shown.sample(u[:2])  # its top left is at (+X, +Y)
+            return _Patch(np.array([(0.5 - s) * w, (0.5 - t) * h, 0.0]), _FORWARD, w * h / density, weight * density)
         case CylinderLight(radius=r, length=length):
             turn, density = _limacon(u[1])
-            normal = np.array([0.0, *_circle(turn + _turn_towards(light, towards), 1.0)])
+            normal = np.array([0.0, *_circle(turn + turn_towards(light, towards), 1.0)])
             return _Patch(r * normal + [(u[0] - 0.5) * length, 0.0, 0.0], normal, math.tau * r * length / density)
     return None
 
@@ -169,20 +171,20 @@ def _patch(light: Light, u: Place, towards: Vector) -> _Patch | None:
 _FORWARD = np.array([0.0, 0.0, -1.0])
 
 
-def _turn_towards(light: Light, towards: Vector) -> float:
-    """Around the light's X axis from Y, in turns."""
+def turn_towards(light: Light, towards: Vector) -> float:
+    """Of a place in the world around the light's X axis from Y, in turns."""
     y, z = np.linalg.solve(light.world_from_light[:3, :3], towards - light.position)[1:]
     return math.atan2(z, y) / math.tau
 
 
 def _limacon(u: float) -> tuple[float, float]:
-    """The turn within ±1/2 at quantile `u` of the density 1 + _BIAS cos(2π · turn), and its density."""
+    """The turn within ±1/2 at quantile `u` of the density 1 + POINTS_BIAS cos(2π · turn), and its density."""
     low, high = -0.5, 0.5
     for _ in range(40):
         turn = 0.5 * (low + high)
-        below = turn + _BIAS * math.sin(math.tau * turn) / math.tau + 0.5 < u
+        below = turn + POINTS_BIAS * math.sin(math.tau * turn) / math.tau + 0.5 < u
         low, high = (turn, high) if below else (low, turn)
-    return turn, 1.0 + _BIAS * math.cos(math.tau * turn)
+    return turn, 1.0 + POINTS_BIAS * math.cos(math.tau * turn)
 
 
 def _circle(turn: float, radius: float) -> tuple[float, float]:

@@ -30,8 +30,8 @@ class RadianceMap:
         """(3,) over the surface."""
         return self.radiance.mean(axis=(0, 1), dtype=np.float64)
 
-    def sample(self, u: tuple[float, float]) -> tuple[tuple[float, float], NDArray[np.float64]]:
-        """A place drawn in proportion to luminance, and the radiance there over its density and the mean, (3,).
+    def sample(self, u: tuple[float, float]) -> tuple[tuple[float, float], NDArray[np.float64], float]:
+        """A place drawn in proportion to luminance, the radiance there over density and mean, (3,), and the density.
 
         The place is in [0, 1]², from the image's left and top. The second has a mean of 1 over samples, or 0 where a
         channel is black.
@@ -39,8 +39,20 @@ class RadianceMap:
         height, width = self._cells.shape[:2]
         row, column, down, right, chance = self._distribution.draw(u)
         place = ((column + right) / width, (row + down) / height)
-        weight = self._cells[row, column] / (chance * height * width) if chance > 0 else np.zeros(3)
-        return place, np.divide(weight, self.mean, out=np.zeros(3), where=self.mean > 0)
+        density = chance * height * width
+        if density == 0.0:
+            return place, np.zeros(3), 1.0
+        return place, self._relative[row, column] / density, density
+
+    @cached_property
+    def cells(self) -> NDArray[np.float32]:
+        """(h, w, 4) that places are drawn from, row 0 at the top: radiance over its mean, and their density."""
+        density = self._distribution.chances * self._cells[..., 0].size
+        return np.concatenate([self._relative, density[..., None]], axis=2).astype(np.float32)
+
+    @cached_property
+    def _relative(self) -> NDArray[np.float64]:
+        return np.divide(self._cells, self.mean, out=np.zeros_like(self._cells), where=self.mean > 0)
 
     @cached_property
     def _cells(self) -> NDArray[np.float64]:

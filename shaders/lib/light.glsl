@@ -62,16 +62,41 @@ float profile(Light light, vec3 emission_direction) {
     return 1.0;
 }
 
+// Along `l`, that one point of a glowing ball stands for: over the mean square of the distance of those on the chord.
+float ball_solid_angle(float extent, float radius, vec3 to_centre, vec3 l) {
+    float along = dot(to_centre, l), radius_squared = radius * radius;
+    float square = 1.5 * along * along + 0.5 * (radius_squared - dot(to_centre, to_centre));
+    return extent / max(square, 1e-6 * radius_squared);
+}
+
+// Along `l`, that the light's point stands for, seen from a relative position; it depends on the direction alone.
+float patch_solid_angle(Light light, vec3 position, vec3 l) {
+    if (light.extent == 0.0 || is_distant(light)) return light.extent;
+    if (light.radius > 0.0) return ball_solid_angle(light.extent, light.radius, light.centre - position, l);
+    vec3 to_light = light.position - position;
+    return light.extent * profile(light, -l) / dot(to_light, to_light);
+}
+
 // How much alpha² grows where a point of the light stands for its whole patch, a disc of solid angle w: half vectors then
 // spread by w / 16π a tangent axis. Points that are strewn evenly err least by twice that variance, and alpha² counts it twice,
 // as in Tokuyoshi & Kaplanyan 2019, "Improved Geometric Specular Antialiasing". Patches shrink with the number of samples, so
 // the mean still converges.
-float patch_alpha_squared(Light light, vec3 position, vec3 l) {
-    if (light.extent == 0.0) return 0.0;
-    vec3 to_light = light.position - position;
-    float solid_angle = light.extent;
-    if (!is_distant(light)) solid_angle *= profile(light, -l) / dot(to_light, to_light);
+float patch_alpha_squared(float solid_angle) {
     return solid_angle / (4.0 * PI);
+}
+
+// Of the light's emission along -l, by its cone, focus and IES profile.
+vec3 shaped(Light light, vec3 l) {
+    vec3 share = vec3(1.0);
+#ifdef SHAPED
+    float cosine = dot(-l, light.axis);
+    float sine = length(cross(l, light.axis));
+    if (is_shaped(light)) share *= shaping(light, cosine, sine);
+#endif
+#ifdef IES
+    share *= ies(light, l, atan(sine, cosine));
+#endif
+    return share;
 }
 
 // Light from `light` at a relative position: the unit vector towards it, and the irradiance on a surface facing it.
@@ -84,15 +109,5 @@ vec3 irradiance_from(Light light, vec3 position, out vec3 l) {
     float distance_squared = dot(to_light, to_light);
     l = to_light * inversesqrt(distance_squared);
     if (distance_squared >= light.reach * light.reach) return vec3(0.0);
-    vec3 emitted = light.intensity;
-#ifdef SHAPED
-    float cosine = dot(-l, light.axis);
-    float sine = length(cross(l, light.axis));
-    if (is_shaped(light)) emitted *= shaping(light, cosine, sine);
-#endif
-    emitted *= profile(light, -l) / distance_squared;
-#ifdef IES
-    emitted *= ies(light, l, atan(sine, cosine));
-#endif
-    return emitted;
+    return light.intensity * shaped(light, l) * (profile(light, -l) / distance_squared);
 }

@@ -35,9 +35,15 @@ float ray_density(Surface s, vec3 v, vec3 l) {
     return density;
 }
 
-// What directions that all pixels share, each standing for an `extent` of the sky, bear of the lobes' light: the rest is the
-// rays'. Veach & Guibas 1995, "Optimally Combining Sampling Techniques for Monte Carlo Rendering", the balance heuristic.
-float share_beside_rays(Surface s, vec3 v, vec3 l, float extent) {
+// What rays bear of a light in lobes, where `denser` times as many of them find it as of the points or directions that all
+// pixels share, which bear the rest. Veach & Guibas 1995, "Optimally Combining Sampling Techniques for Monte Carlo Rendering",
+// the power heuristic.
+float share_of_rays(float denser) {
+    return 1.0 - 1.0 / (1.0 + denser * denser);
+}
+
+// The rest, of a point or a direction that stands for a solid angle.
+float share_beside_rays(Surface s, vec3 v, vec3 l, float solid_angle) {
     float share = ray_share(s, v);
-    return share > 0.0 ? 1.0 / (1.0 + extent * view.sky_rays * share * ray_density(s, v, l)) : 1.0;
+    return share > 0.0 ? 1.0 - share_of_rays(solid_angle * view.lobe_rays * share * ray_density(s, v, l)) : 1.0;
 }

@@ -11,7 +11,7 @@ struct View {
     uint sample_index;
     float pixel_share;         // of a pixel, that a sample's highlights stand for; plan/points.py
     float sky_share;           // of a dome, that four of its directions stand for
-    float sky_rays;            // of a pixel, in all samples together
+    float lobe_rays;           // of a pixel, in all samples together
 };
 
 struct Instance {
@@ -87,6 +87,7 @@ struct Light {
     uint shadow_count;         // 0: casts none
     uint is_sky;               // one of the few directions that stand for a dome
     float extent;              // area that the point stands for; a distant light's solid angle; 0 for a point
+    uint by_rays;              // lobes see it by rays of each pixel's own as well
     vec3 right;                // unit, the light's X and Y: what an IES profile's horizontal angle is measured from
     float ies_scale;           // of its candela
     vec3 up;
@@ -97,6 +98,24 @@ struct Light {
     float shadow_fading;       // depth of the zone before it in which shadows fade
     float shadow_gamma;
     vec2 ies_vertical;         // the profile is read at x * angle + y radians
+    vec3 centre;
+    float radius;              // of the glowing ball around it that the point lies in; 0 for another
+};
+
+struct Lamp {
+    vec4 x;                    // rows that take a relative position to the lamp's own space, where it is of unit size
+    vec4 y;
+    vec4 z;
+    vec3 radiance;
+    uint shape;
+    vec3 centre;
+    float radius;              // of what is around all of it; of a distant light the chord of its half angle
+    float area;                // that one of its points stands for, in its own space; a solid angle of a distant light
+    float stretch;             // volume in the world of a unit cube of its space
+    vec2 bias;                 // by which a cylinder's points turn to what is lit
+    uvec2 cells;               // columns and rows of what a rectangle shows; 0 for none
+    uint first_cell;
+    uint casts_shadow;
 };
 
 struct ShadowMap {

@@ -5,7 +5,7 @@
 #ifdef PLANE_LINKS
 #include "lib/linking.glsl"
 #endif
-#ifdef SKY_RAYS
+#ifdef LOBE_RAYS
 #include "lib/lobe_rays.glsl"
 #endif
 #include "lib/render_space.glsl"
@@ -47,8 +47,8 @@ vec3 lobe_response(Light light, Surface s) {
 #ifdef PLANE_WEIGHTS
     response *= s.weights.xyy;
 #endif
-#if defined(SKY) && !defined(SKY_RAYS)
-    if (light.is_sky == 0u) return response;
+#ifdef SKY
+    if (light.is_sky == 0u || light.by_rays != 0u) return response;
 #ifdef PLANE_CLEARCOAT
     response.z *= 1.0 - sharpness(s.clearcoat_roughness, view.sky_share);
 #endif
@@ -79,12 +79,13 @@ Lit lit_by(Light light, vec3 l, vec3 irradiance, Surface surface, vec3 position,
 #endif
     vec3 response = lobe_response(light, surface);
 #ifdef PATCHES
-    surface.blur = blur + patch_alpha_squared(light, position, l);
+    float solid_angle = patch_solid_angle(light, position, l);
+    surface.blur = blur + patch_alpha_squared(solid_angle);
 #endif
-#ifdef SKY_RAYS
-    if (light.is_sky != 0u) {
+#ifdef LOBE_RAYS
+    if (light.by_rays != 0u) {
         surface.blur = 0.0;    // a pixel's own rays are strewn as wide as its lobes
-        response.yz *= share_beside_rays(surface, v, l, light.extent);
+        response.yz *= share_beside_rays(surface, v, l, solid_angle);
     }
 #endif
     vec3 arriving = render_from_rec709(irradiance);
