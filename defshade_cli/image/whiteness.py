@@ -14,18 +14,29 @@ from defshade_cli.scene.texture import Channel, ImageFile
 _CELLS = 512
 """A side, that are told apart at most."""
 
-_KNOWN: dict[tuple[str, int, Channel], NDArray[np.bool_]] = {}
+_MOST_KEPT = 128
+"""Images that are remembered, of a megabyte each."""
+
+_KNOWN: dict[tuple[str, int, Channel], NDArray[np.int32]] = {}
 
 
-def below_one(file: ImageFile, channel: Channel) -> NDArray[np.bool_]:
-    """(H, W), row 0 at the bottom: cells of an image in which the channel, the first of several, is below 1 somewhere.
+def below_one(file: ImageFile, channel: Channel) -> NDArray[np.int32]:
+    """(H + 1, W + 1) how many cells below each row and left of each column hold a texel that is below 1.
 
-    One cell where all are alike. Raises OSError for what cannot be read.
+    Row 0 is at the bottom; of a channel that stands for several the first counts. One cell where all are alike.
+    Raises OSError for what cannot be read.
     """
     key = file.path, _stamp(file), channel
     if key not in _KNOWN:
-        _KNOWN[key] = _looked_at(file, channel)
+        while len(_KNOWN) >= _MOST_KEPT:
+            _KNOWN.pop(next(iter(_KNOWN)))
+        _KNOWN[key] = _summed(_looked_at(file, channel))
     return _KNOWN[key]
+
+
+def _summed(cells: NDArray[np.bool_]) -> NDArray[np.int32]:
+    sums = np.pad(cells, ((1, 0), (1, 0))).cumsum(axis=0, dtype=np.int32)
+    return np.cumsum(sums, axis=1, dtype=np.int32, out=sums)
 
 
 def _stamp(file: ImageFile) -> int:

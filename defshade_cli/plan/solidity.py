@@ -19,6 +19,9 @@ from defshade_cli.scene.texture import FIRST_UDIM, STATED_SPACES, TextureInput
 Boxes = tuple[NDArray[np.float64], NDArray[np.float64]]
 """(T, 2) the least and the greatest texture coordinates of triangles."""
 
+_SOME = 1024
+"""Triangles that are looked at before all others: of what is cut out they tell."""
+
 _KNOWN: WeakKeyDictionary[Mesh, dict[tuple[Subset, TextureInput], bool]] = WeakKeyDictionary()
 
 
@@ -39,7 +42,9 @@ def _is_solid(scene: Scene, number: int, material: Material) -> bool:
     for mesh, subset in _shown_on(scene, number):
         known = _KNOWN.setdefault(mesh, {})
         if (subset, fed) not in known:
-            known[subset, fed] = _is_one_over(fed, _boxes(mesh, subset, fed))
+            triangles = mesh.triangles[subset.first : subset.first + subset.count]
+            some = triangles[:: 1 + len(triangles) // _SOME]
+            known[subset, fed] = all(_is_one_over(fed, _boxes(mesh, each, fed)) for each in (some, triangles))
         if not known[subset, fed]:
             return False
     return True
@@ -50,13 +55,12 @@ def _shown_on(scene: Scene, number: int) -> Iterator[tuple[Mesh, Subset]]:
     return ((scene.meshes[mesh], subset) for mesh, subset in dict.fromkeys(runs))
 
 
-def _boxes(mesh: Mesh, subset: Subset, fed: TextureInput) -> Boxes:
-    """Where the triangles are in the image; without coordinates at its corner."""
-    uvs = mesh.uvs.get(fed.uv, np.zeros((len(mesh.points), 2), np.float32))
-    linear = np.array(fed.texture_from_uv)
-    at = uvs.astype(np.float64) @ linear[:, :2].T + linear[:, 2]
-    corners = at[mesh.triangles[subset.first : subset.first + subset.count]]
-    return corners.min(axis=1), corners.max(axis=1)
+def _boxes(mesh: Mesh, triangles: NDArray[np.uint32], fed: TextureInput) -> Boxes:
+    """Where triangles (T, 3) are in the image; without coordinates at its corner."""
+    s, t = mesh.uvs.get(fed.uv, np.zeros((len(mesh.points), 2), np.float32)).astype(np.float64).T
+    at = np.column_stack([s * x + t * y + offset for x, y, offset in fed.texture_from_uv])
+    a, b, c = (at[corner] for corner in triangles.T)
+    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
 def _is_one_over(fed: TextureInput, boxes: Boxes) -> bool:
@@ -64,37 +68,34 @@ def _is_one_over(fed: TextureInput, boxes: Boxes) -> bool:
     from defshade_cli.image.whiteness import below_one
 
     texture, (low, high) = fed.texture, boxes
-    if not np.isfinite(high - low).all():
-        return False
+    if not len(low) or not np.isfinite(high - low).all():
+        return not len(low)
     try:
-        below = {_cell(number): below_one(file, fed.channel) for number, file in texture.tiles}
+        below = {number - FIRST_UDIM: below_one(file, fed.channel) for number, file in texture.tiles}
     except OSError:  # told where the image is loaded
         return False
     wraps = {texture.wrap_s, texture.wrap_t}
-    if not (texture.udim or wraps & {"black", "useMetadata"} or any(b.any() for b in below.values())):
+    if not (texture.udim or wraps & {"black", "useMetadata"} or any(sums[-1, -1] for sums in below.values())):
         return True
     cells = np.floor(low)
     if wraps == {"repeat"} and not texture.udim:
         low, high, cells = low - cells, high - cells, np.zeros_like(cells)
-    return all(
-        cell in below and not _touches(below[cell], low[there] - cell, high[there] - cell)
-        for cell, there in ((tuple(each), (cells == each).all(axis=1)) for each in np.unique(cells, axis=0))
-    )
+    tiles = cells @ (1.0, 10.0)
+    if (cells < 0.0).any() or cells[:, 0].max() > 9.0 or tiles.max() > max(below):
+        return False
+    for tile in np.flatnonzero(np.bincount(tiles.astype(np.intp))).tolist():
+        there = tiles == tile
+        if tile not in below or _touches(below[tile], low[there] - cells[there], high[there] - cells[there]):
+            return False
+    return True
 
 
-def _cell(number: int) -> tuple[float, float]:
-    """Of a UDIM tile, its least texture coordinates."""
-    row, column = divmod(number - FIRST_UDIM, 10)
-    return float(column), float(row)
-
-
-def _touches(below: NDArray[np.bool_], low: NDArray[np.float64], high: NDArray[np.float64]) -> bool:
-    """Does a box within the image, or the half texel that is filtered around it, meet any of (H, W), or end beyond?"""
+def _touches(sums: NDArray[np.int32], low: NDArray[np.float64], high: NDArray[np.float64]) -> bool:
+    """Does a box within the image, or the half texel that is filtered around it, meet a cell below 1, or end beyond?"""
     if (high > 1.0).any():
         return True
-    size = np.array(below.shape[::-1])
+    size = np.array(sums.shape[::-1]) - 1
     first = np.clip(np.floor(low * size - 0.5), 0, size - 1).astype(np.intp)
     end = np.clip(np.floor(high * size + 0.5), 0, size - 1).astype(np.intp) + 1
-    sums = np.pad(below, ((1, 0), (1, 0))).cumsum(axis=0, dtype=np.int32).cumsum(axis=1, dtype=np.int32)
     (x0, y0), (x1, y1) = first.T, end.T
     return bool((sums[y1, x1] - sums[y0, x1] - sums[y1, x0] + sums[y0, x0]).any())
