@@ -68,28 +68,45 @@ ShadowTexel shadow_texel(Light light, vec3 position) {
 // What surfaces may leave between themselves and their receivers, of their depth's steps from texel to texel: the snapping of
 // vertices to a raster's grid, and bends that are as narrow as a texel.
 const float STEP_OFFSET = 1.0 / 32.0, BEND_OFFSET = 0.5;
+const float STRAIGHT = 32.0;    // times that a surface bends less ahead than at a texel beside another
 
 struct Casters {
     vec4 stored;               // depths at the four texels around a receiver
     vec4 here;                 // where each one's surface goes on to at the receiver
 };
 
-// A texel's surface goes on by its step towards the receiver or by that from behind, whichever lies deeper. On a plane both are
-// right, on a ridge the first, in a hollow the second, and at an edge neither hides what is beyond it. Depths that are
-// compared across a texel instead either shadow slopes by themselves or, offset, let light through where things touch.
+// What a row's surfaces go on by from its texels towards the receiver, by the steps that lead there and those from behind, and how
+// much they may bend; `across` has the other texel of each pair.
+struct Steps {
+    vec4 on;
+    vec4 bends;
+};
+
+// The deeper of both: on a plane both are right, on a ridge the step ahead, in a hollow that from behind, and at an edge neither
+// hides what is beyond it. But where the surface ahead is straight and turns at the texel by much more, what lies behind is
+// another, nearer to the light, and says nothing of this one.
+Steps steps_of(vec4 behind, vec4 ahead, vec4 bend, vec4 bend_ahead) {
+    vec4 deeper = min(behind, ahead);
+    vec4 bends = min(bend, abs(clamp(vec4(0.0), deeper, max(behind, ahead))));
+    bvec4 straight = lessThan(STRAIGHT * bend_ahead, bend);
+    return Steps(mix(deeper, ahead, straight), mix(bends, min(bends, bend_ahead / BEND_OFFSET), straight));
+}
+
+// A texel's surface goes on to the receiver. Depths that are compared across a texel instead either shadow slopes by
+// themselves or, offset, let light through where things touch.
 Casters casters_at(vec2 place) {
     vec2 corner = floor(place + 0.5), t = place + 0.5 - corner;
     vec2 low = (corner - 1.0) / ATLAS, high = (corner + 1.0) / ATLAS;
     vec4 ll = textureGather(shadow_atlas, low, 0), hl = textureGather(shadow_atlas, vec2(high.x, low.y), 0);
     vec4 lh = textureGather(shadow_atlas, vec2(low.x, high.y), 0), hh = textureGather(shadow_atlas, high, 0);
     vec4 z = vec4(lh.z, hh.w, hl.x, ll.y);
-    vec4 x0 = z - vec4(lh.w, hh.z, hl.y, ll.x), x1 = z.yxwz - z, x = min(x0, x1);
-    vec4 y0 = z - vec4(lh.y, hh.x, hl.w, ll.z), y1 = z.wzyx - z, y = min(y0, y1);
+    vec4 x0 = z - vec4(lh.w, hh.z, hl.y, ll.x), x1 = z.yxwz - z, x_bend = abs(x1 - x0);
+    vec4 y0 = z - vec4(lh.y, hh.x, hl.w, ll.z), y1 = z.wzyx - z, y_bend = abs(y1 - y0);
+    Steps x = steps_of(x0, x1, x_bend, x_bend.yxwz), y = steps_of(y0, y1, y_bend, y_bend.wzyx);
     vec4 dx = vec4(t.x, 1.0 - t.x, 1.0 - t.x, t.x), dy = vec4(1.0 - t.y, 1.0 - t.y, t.y, t.y);
-    vec4 aside = max(min(z + z.zwxy - z.yxwz - z.wzyx, -max(x, y)), 0.0);
-    vec4 bends = min(abs(x1 - x0), abs(clamp(vec4(0.0), x, max(x0, x1)))) + min(abs(y1 - y0), abs(clamp(vec4(0.0), y, max(y0, y1))));
-    vec4 offset = STEP_OFFSET * (abs(x) + abs(y)) + BEND_OFFSET * bends;
-    return Casters(z, z + x * dx + y * dy + aside * dx * dy - offset);
+    vec4 aside = max(min(z + z.zwxy - z.yxwz - z.wzyx, -max(x.on, y.on)), 0.0);
+    vec4 offset = STEP_OFFSET * (abs(x.on) + abs(y.on)) + BEND_OFFSET * (x.bends + y.bends);
+    return Casters(z, z + x.on * dx + y.on * dy + aside * dx * dy - offset);
 }
 
 #ifdef SHADOW_STYLES
