@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pxr import Gf, Usd, UsdGeom, UsdShade, Vt
 
+from defshade_cli.usd import refiner
 from defshade_cli.usd.geometry import is_time_varying, read_surface
 from defshade_cli.usd.tessellation import Tessellation
 from prims import CUBE_FACES, CUBE_POINTS, Drawn, define_cube, define_mesh, is_watertight, read, reasons, set_primvar
@@ -48,6 +49,20 @@ def test_volume_converges_by_the_square_of_the_edge() -> None:
     volumes = [volume_of(read(ball(), level=level).mesh) for level in (2, 3, 4, 5)]
     steps = np.diff(volumes)
     np.testing.assert_allclose(steps[:-1] / steps[1:], 4, rtol=0.15)
+
+
+def test_meshes_that_are_wired_alike_share_their_weights(monkeypatch: pytest.MonkeyPatch) -> None:
+    creased = ball()
+    creased.CreateCreaseIndicesAttr([0, 1])
+    creased.CreateCreaseLengthsAttr([2])
+    creased.CreateCreaseSharpnessesAttr([3.0])
+    cages = [read_surface(mesh.GetPrim(), Usd.TimeCode.Default()) for mesh in (ball(), ball(), creased)]
+    first, second, other = (refiner.Refiner(cage.control, 2) for cage in cages)
+    assert first.control.topology is not second.control.topology
+    finer = refiner.Refiner(cages[0].control, 3)
+    monkeypatch.setattr(refiner, "refine", lambda *_: pytest.fail("made again"))
+    assert refiner.Refiner(cages[1].control, 2)._weights is first._weights is second._weights
+    assert len({id(each._weights) for each in (first, other, finer)}) == 3
 
 
 def test_left_handed_cages_keep_their_outside() -> None:

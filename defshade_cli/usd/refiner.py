@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +14,46 @@ from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.subdivision import Stencils, limit, refine, refine_face_varying
 from defshade_cli.usd.welding import weld
 
-_MOST_KEPT = 8
-"""Sets of face-varying stencils that are remembered."""
+_MOST_KEPT = 64
+"""Sets of face-varying stencils of one topology that are remembered."""
+
+FaceVarying = tuple[Stencils, NDArray[np.int32]]
+
+
+class Weights:
+    """Of one control mesh at one level, whatever points and primvars it has; meshes that are wired alike share them."""
+
+    def __init__(self, control: Control, level: int) -> None:
+        self.refinement = refine(control.topology, level)
+        self.limit = limit(self.refinement)
+        self._control, self._level = control, level
+        self._face_varying: dict[bytes, FaceVarying] = {}
+
+    def face_varying(self, number: NDArray[np.int32], count: int) -> FaceVarying:
+        """Of primvars with `count` values, of which each corner has the one of its number."""
+        key = number.tobytes()
+        if key not in self._face_varying:
+            if len(self._face_varying) == _MOST_KEPT:
+                self._face_varying.clear()
+            self._face_varying[key] = refine_face_varying(
+                self._control.topology, number, count, self._control.face_varying, self._level, at_limit=True
+            )
+        return self._face_varying[key]
+
+
+_KNOWN: WeakValueDictionary[tuple[bytes, str, int], Weights] = WeakValueDictionary()
+
+
+def _weights(control: Control, level: int) -> Weights:
+    key = control.topology.digest(), control.face_varying, level
+    known = _KNOWN.get(key)
+    if known is None:
+        known = _KNOWN[key] = Weights(control, level)
+    return known
 
 
 class Refiner:
-    """The weights of one control mesh at one level, made once for the points and primvars of every frame.
+    """A control mesh at one level: its weights, and the primvars that it had last.
 
     Refined points are moved to the limit surface, so that every level lies on the same surface and has its exact
     normals. Points are one a sector, see subdivision.Limit: a crease splits them, and normals stay on the points.
@@ -26,10 +61,9 @@ class Refiner:
 
     def __init__(self, control: Control, level: int) -> None:
         self.control, self.level = control, level
-        self._refinement = refine(control.topology, level)
-        self._limit = limit(self._refinement)
+        self._weights = _weights(control, level)
+        self._refinement, self._limit = self._weights.refinement, self._weights.limit
         self._last: dict[Primvar, Primvar] = {}
-        self._face_varying: dict[bytes, tuple[Stencils, NDArray[np.int32]]] = {}
 
     def fits(self, control: Control, level: int) -> bool:
         """Whether it serves this control cage at this level."""
@@ -77,12 +111,5 @@ class Refiner:
     def _carried_corners(self, values: NDArray[np.float32], cage: Polygons) -> NDArray[np.float64]:
         """Corners with one value at one point are one, so that the primvar is smooth across their edge."""
         number, chosen = weld(cage.indices, values)
-        key = number.tobytes()
-        if key not in self._face_varying:
-            if len(self._face_varying) == _MOST_KEPT:
-                self._face_varying.clear()
-            self._face_varying[key] = refine_face_varying(
-                self.control.topology, number, len(chosen), self.control.face_varying, self.level, at_limit=True
-            )
-        stencils, at = self._face_varying[key]
+        stencils, at = self._weights.face_varying(number, len(chosen))
         return (stencils @ values[chosen])[at]
