@@ -22,7 +22,7 @@ VOLUME = 44.0
 TILE_PIXEL, TILE_LIGHT = 39.0, 12.0
 """ns of tiles a pixel, and a light there."""
 
-WHOLE_DRAW, WHOLE_LIGHT, LIGHTS_A_DRAW = 27.0, 6.5, 8
+WHOLE_DRAW, WHOLE_LIGHT, LIGHTS_A_DRAW = 27.0, 6.5, 12
 """ns a pixel of a draw of the whole image, and of each of its lights, of which it has so many at most."""
 
 

@@ -114,9 +114,20 @@ def _from_shape(polygons: Polygons, like: Primvar) -> NDArray[np.float32]:
 
 def _opposed(polygons: Polygons, normals: Primvar) -> bool:
     """Do the normals, on the whole, point away from the outside that the winding gives?"""
-    areas = _outward_areas(polygons)
-    along = np.einsum("ci,ci->", areas[polygons.face_of_corner], polygons.at_corners(normals))
-    return bool(along < _OPPOSED * (np.linalg.norm(areas, axis=1) @ polygons.counts))
+    at_corners = polygons.at_corners(normals)
+    along, most = 0.0, 0.0
+    for _, corners in polygons.by_size():
+        areas = _rough_areas(polygons.points[polygons.indices[corners]])
+        along += np.einsum("bi,bni->", areas, at_corners[corners], dtype=np.float64)
+        most += corners.shape[1] * np.sqrt(np.einsum("bi,bi->b", areas, areas)).sum(dtype=np.float64)
+    return bool((-along if polygons.left_handed else along) < _OPPOSED * most)
+
+
+def _rough_areas(corners: NDArray[np.float32]) -> NDArray[np.floating]:
+    """As vector_areas, of quads by their diagonals in float32."""
+    if corners.shape[1] != 4:
+        return vector_areas(corners.astype(np.float64))
+    return cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
 
 
 def _unit(vectors: NDArray[Any]) -> NDArray[np.float32]:
