@@ -75,6 +75,8 @@ def _wanted_level(surface: Surface, pixels_per_unit: float) -> int:
     if surface.control is None:
         return 0
     halvings = _halvings(surface.mean_edge * pixels_per_unit / EDGE_PIXELS)
+    if not halvings:
+        return 0
     quarterings = _halvings(surface.rise * pixels_per_unit / FLAT_PIXELS) / 2.0
     return min(math.ceil(min(halvings, quarterings)), FINEST_LEVEL)
 

@@ -6,7 +6,8 @@ Refinement halves e and θ alike, so that every level leaves a quarter of the di
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from functools import wraps
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -19,28 +20,27 @@ _QUANTILE = 0.98
 """Of the edges that are taken for the surface; the few sharpest would refine all others with them."""
 
 
-class Flatness(NamedTuple):
-    """mean_edge: root of the mean square of the edges' lengths.  rise: of the surface over its cage."""
+def _once(measured: Callable[[Polygons], float]) -> Callable[[Polygons], float]:
+    """Measured once for polygons that surfaces share."""
+    known: WeakKeyDictionary[Polygons, float] = WeakKeyDictionary()
 
-    mean_edge: float
-    rise: float
+    @wraps(measured)
+    def measure(polygons: Polygons) -> float:
+        found = known.get(polygons)
+        if found is None:
+            found = known[polygons] = measured(polygons)
+        return found
 
-
-_KNOWN: WeakKeyDictionary[Polygons, Flatness] = WeakKeyDictionary()
-
-
-def flatness(polygons: Polygons) -> Flatness:
-    """In object units; measured once for polygons that surfaces share."""
-    if polygons not in _KNOWN:
-        _KNOWN[polygons] = Flatness(mean_edge(polygons), rise(polygons))
-    return _KNOWN[polygons]
+    return measure
 
 
+@_once
 def mean_edge(polygons: Polygons) -> float:
-    """Root of the mean square of the edges' lengths, 0 without any; an edge counts once a face."""
+    """Root of the mean square of the edges' lengths in object units, 0 without any; an edge counts once a face."""
     return float(np.sqrt(np.square(_edges(polygons)).sum() / max(len(polygons.indices), 1)))
 
 
+@_once
 def rise(polygons: Polygons) -> float:
     """Of the surface over its cage, in object units."""
     rises = _warps(polygons) if polygons.scheme == "bilinear" else _arcs(polygons)

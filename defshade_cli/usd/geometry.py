@@ -22,7 +22,7 @@ from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.control import CONTROL_ATTRIBUTES, Control, read_control, smooth_control
 from defshade_cli.usd.copies import Copies
 from defshade_cli.usd.cut import Cut, cut, varies
-from defshade_cli.usd.flatness import flatness
+from defshade_cli.usd.flatness import mean_edge, rise
 from defshade_cli.usd.gprims import read_solid, size_attributes
 from defshade_cli.usd.mesh import MESH_ATTRIBUTES, read_mesh
 from defshade_cli.usd.normals import with_normals
@@ -79,12 +79,12 @@ class Surface:
     @property
     def mean_edge(self) -> float:
         """Root of the mean square of the edges' lengths, in scene units."""
-        return flatness(self.polygons).mean_edge
+        return mean_edge(self.polygons)
 
     @property
     def rise(self) -> float:
         """How far the surface rises over its cage, in scene units."""
-        return flatness(self.polygons).rise
+        return rise(self.polygons)
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)

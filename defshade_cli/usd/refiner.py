@@ -30,7 +30,7 @@ class Weights:
         self._face_varying: dict[bytes, FaceVarying] = {}
 
     def face_varying(self, number: NDArray[np.int32], count: int) -> FaceVarying:
-        """Of primvars with `count` values, of which each corner has the one of its number."""
+        """Of primvars with `count` values. number: (C,) which of them each corner has."""
         key = number.tobytes()
         if key not in self._face_varying:
             if len(self._face_varying) == _MOST_KEPT:
