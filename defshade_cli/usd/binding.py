@@ -52,13 +52,17 @@ NOTHING_BOUND = Bindings()
 
 
 class Bound(NamedTuple):
-    """The bindings that USD resolves for a prim. by_collection: some on it or above it bind what a collection holds."""
+    """The bindings that USD resolves for a prim.
+
+    by_collection: some on it or above it bind what a collection holds.  by_purpose: some are for one purpose alone.
+    """
 
     bindings: Bindings
     by_collection: bool
+    by_purpose: bool
 
 
-NOTHING_ABOVE = Bound(NOTHING_BOUND, by_collection=False)
+NOTHING_ABOVE = Bound(NOTHING_BOUND, by_collection=False, by_purpose=False)
 
 
 def read_bound(stage: Usd.Stage, path: str, above: Bound, said: Collection[str] | None = None) -> Bound:
@@ -72,13 +76,16 @@ def read_bound(stage: Usd.Stage, path: str, above: Bound, said: Collection[str] 
     if not own and not above.by_collection:
         return above
     by_collection = above.by_collection or any(":collection:" in name for name in own)
-    return Bound(_resolve(stage.GetPrimAtPath(path)), by_collection)
+    by_purpose = above.by_purpose or any(":full" in name or ":preview" in name for name in own)
+    return Bound(_resolve(stage.GetPrimAtPath(path), by_purpose=by_purpose), by_collection, by_purpose)
 
 
-def _resolve(prim: Usd.Prim) -> Bindings:
+def _resolve(prim: Usd.Prim, *, by_purpose: bool) -> Bindings:
     """What is bound to `prim`, a gprim, a subset or an instance, by its own stage hierarchy."""
     api = UsdShade.MaterialBindingAPI(prim)
     _, everywhere = api.ComputeBoundMaterial()
+    if not by_purpose:
+        return Bindings(all_purpose=_binding(everywhere))
     full, preview = (
         _binding(relationship) if relationship != everywhere else None
         for purpose in (UsdShade.Tokens.full, UsdShade.Tokens.preview)
