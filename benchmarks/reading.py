@@ -14,7 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from pxr import Gf, Usd, UsdGeom, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
 from defshade_cli.usd.reader import StageReader
 
@@ -53,11 +53,38 @@ def meshes(count: int, side: int, distinct: bool = True, rewired: bool = False) 
     return stage
 
 
+def surfaces(count: int) -> Usd.Stage:
+    """Meshes as above without a subdivisionScheme, which are refined as often as the picture needs."""
+    stage = meshes(count, 2)
+    for prim in stage.TraverseAll():
+        prim.RemoveProperty("subdivisionScheme")
+    return stage
+
+
+def dressed(count: int) -> Usd.Stage:
+    """The same with normals, texture coordinates and a material, as they are exported."""
+    stage = meshes(count, 2)
+    rng = np.random.default_rng(1)
+    material = UsdShade.Material.Define(stage, "/Looks/Grey")
+    shader = UsdShade.Shader.Define(stage, "/Looks/Grey/Surface")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    material.CreateSurfaceOutput().ConnectToSource(shader.CreateOutput("surface", Sdf.ValueTypeNames.Token))
+    for prim in [prim for prim in stage.TraverseAll() if prim.IsA(UsdGeom.Mesh)]:
+        mesh = UsdGeom.Mesh(prim)
+        mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.tile(np.float32([0, 0, 1]), (9, 1))))
+        uvs = UsdGeom.PrimvarsAPI(prim).CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, "faceVarying")
+        uvs.Set(Vt.Vec2fArray.FromNumpy(rng.random((16, 2), np.float32)))
+        UsdShade.MaterialBindingAPI.Apply(prim).Bind(material)
+    return stage
+
+
 GENERATED: dict[str, Callable[[], Usd.Stage]] = {
     "7,000 cubes": lambda: cubes(7000),
     "7,000 equal meshes of 8 triangles": lambda: meshes(7000, 2, distinct=False),
     "7,000 meshes of 8 triangles": lambda: meshes(7000, 2),
     "7,000 of 8, wired differently": lambda: meshes(7000, 2, rewired=True),
+    "2,000 of 8, dressed": lambda: dressed(2000),
+    "2,000 subdivision surfaces": lambda: surfaces(2000),
     "400 meshes of 2,592 triangles": lambda: meshes(400, 36),
 }
 

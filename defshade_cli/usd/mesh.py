@@ -14,6 +14,7 @@ from defshade_cli.usd.polygons import SCHEMES, Polygons, Primvar, Scheme
 from defshade_cli.usd.positions import read_positions, still_positions
 from defshade_cli.usd.primvars import (
     DISPLAY_COLOR,
+    NOTHING_CARRIED,
     Authored,
     Elements,
     authored,
@@ -49,7 +50,7 @@ def read_mesh(
         sizes = _sizes(counts)
     scheme = _scheme(prim, issues) if "subdivisionScheme" in names else "catmullClark"
     elements = count_elements(len(counts), len(points), len(indices))
-    has_normals = scheme == "none" and ("normals" in names or "primvars:normals" in names)
+    carried = read_carried(prim, time, elements, issues, color) if said.primvars else NOTHING_CARRIED
     polygons = Polygons(
         points=points,
         counts=sizes.counts,
@@ -58,10 +59,9 @@ def read_mesh(
         holes=_holes(prim, time, len(counts), issues) if "holeIndices" in names else _NONE,
         scheme=scheme,
         left_handed="orientation" in names and prim.GetAttribute("orientation").Get() == UsdGeom.Tokens.leftHanded,
-        normals=_normals(UsdGeom.Mesh(prim), time, elements, issues) if has_normals else None,
+        normals=_normals(prim, said, time, elements, issues) if scheme == "none" else None,
+        **carried._asdict(),
     )
-    if said.primvars:
-        polygons = read_carried(prim, time, elements, issues, color).laid_on(polygons)
     return mend_normals(polygons if is_whole else _without_broken_faces(polygons, issues), issues)
 
 
@@ -156,18 +156,16 @@ def _holes(prim: Usd.Prim, time: Usd.TimeCode, faces: int, issues: list[str]) ->
     return holes[valid]
 
 
-def _normals(mesh: UsdGeom.Mesh, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> Primvar | None:
+def _normals(prim: Usd.Prim, said: Said, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> Primvar | None:
     """primvars:normals wins over normals, unless it is of no use."""
-    attribute = mesh.GetNormalsAttr()
-    sources = (
-        authored(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals"), time),
-        Authored("normals", attribute.Get(time), mesh.GetNormalsInterpolation()),
-    )
-    for source in sources:
-        normals = fit(source, 3, elements, issues)
-        if normals is not None:
-            return normals
-    return None
+    normals = None
+    if "primvars:normals" in said.names:
+        normals = fit(authored(UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals"), time), 3, elements, issues)
+    if normals is None and "normals" in said.names:
+        mesh = UsdGeom.Mesh(prim)
+        value = Authored("normals", mesh.GetNormalsAttr().Get(time), mesh.GetNormalsInterpolation())
+        normals = fit(value, 3, elements, issues)
+    return normals
 
 
 def _without_broken_faces(polygons: Polygons, issues: list[str]) -> Polygons:

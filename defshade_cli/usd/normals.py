@@ -92,11 +92,12 @@ def _corner_angles(polygons: Polygons) -> NDArray[np.float64]:
 
 def _of_unit_length(polygons: Polygons, normals: Primvar, issues: list[str]) -> Primvar:
     values = normals.values
-    lost = ~np.logical_and(np.isfinite(values).all(axis=1), values.any(axis=1))
+    squares = np.einsum("ni,ni->n", values, values, dtype=np.float64)
+    lost = ~((squares > 0.0) & (squares < np.inf))  # NaN is neither
     if lost.any():
         issues.append(f"{lost.sum()} normals have no direction and follow from the shape")
         values = np.where(lost[:, None], _from_shape(polygons, normals), values)
-    return replace(normals, values=_unit(values))
+    return Primvar(_unit(values), normals.interpolation)
 
 
 def _from_shape(polygons: Polygons, like: Primvar) -> NDArray[np.float32]:
