@@ -1,7 +1,7 @@
 """How lights are drawn: what is cheapest, by how many there are and the share of the image that they cover.
 
 A volume reads the GBuffer and blends for each pixel that it covers; tiles do so once a pixel, whatever the lights, but
-bin them first; lights on the whole image need no lists, are half as dear each, and shine where they do not reach.
+bin them first; lights on the whole image need no lists, one draw for all kinds, and shine where they do not reach.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from defshade_cli.spaces import transform_points
 VOLUME = 44.0
 """ns a pixel that a volume covers. llvmpipe, the float layout, as all of these."""
 
-TILE_PIXEL, TILE_LIGHT = 39.0, 12.0
-"""ns of tiles a pixel, and a light there."""
+TILE_PIXEL, TILE_LIGHT = 45.0, 6.5
+"""ns of tiles a pixel for each kind of lights, and a light there."""
 
-WHOLE_DRAW, WHOLE_LIGHT, LIGHTS_A_DRAW = 27.0, 6.5, 12
+WHOLE_DRAW, WHOLE_LIGHT, LIGHTS_A_DRAW = 30.0, 5.5, 12
 """ns a pixel of a draw of the whole image, and of each of its lights, of which it has so many at most."""
 
 
@@ -41,12 +41,17 @@ def choose_lighting(
     covered, count = covered_share(lights, camera), sum(planned.points for planned in lights)
     costs: dict[Lighting, float] = {
         "volumes": VOLUME * covered,
-        "tiles": TILE_PIXEL + TILE_LIGHT * covered,
+        "tiles": TILE_PIXEL * _count_kinds(lights, settings) + TILE_LIGHT * covered,
         "whole": WHOLE_DRAW * math.ceil(count / LIGHTS_A_DRAW) + WHOLE_LIGHT * count,
     }
     if pixels * settings.most_samples < _WORTHWHILE:
         del costs["whole"]
     return min(costs, key=costs.__getitem__)
+
+
+def _count_kinds(lights: Sequence[PlannedLight], settings: RenderSettings) -> int:
+    """Of lights that tiles draw apart: by their groups, shape and shadows."""
+    return len({(p.groups, p.light.shaping is not None, settings.shadows and p.light.is_infinite) for p in lights})
 
 
 def covered_share(lights: Sequence[PlannedLight], camera: Camera) -> float:
