@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +22,13 @@ class AccumulationPass:
 
     def __init__(self, gpu: Gpu, frame: Frame, screen: Screen) -> None:
         self._context, self._frame, self._screen = gpu.context, frame, screen
-        self._whole = Screen(gpu)
-        self._program = gpu.shaders.program("screen.vert", "accumulate.frag")
-        self._arrays = {screen: screen.array(self._program), self._whole: self._whole.array(self._program)}
+        self._whole, self._shaders = Screen(gpu), gpu.shaders
+
+    @cached_property
+    def _arrays(self) -> dict[Screen, moderngl.VertexArray]:
+        """Compiled where a second sample is added."""
+        program = self._shaders.program("screen.vert", "accumulate.frag")
+        return {screen: screen.array(program) for screen in (self._screen, self._whole)}
 
     step: Target
     total: Target | None
@@ -65,5 +71,5 @@ class AccumulationPass:
         self._context.enable_only(moderngl.BLEND)
         self._context.blend_func = moderngl.ONE, moderngl.ONE
         term.textures["radiance"].use(0)
-        self._program["sample_radiance"] = 0
+        self._arrays[screen].program["sample_radiance"] = 0
         screen.draw(self._arrays[screen])

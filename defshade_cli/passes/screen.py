@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
@@ -57,11 +59,14 @@ class TileMask:
     """Keeps passes away from tiles that are done: a depth there that fragments fail before they are shaded."""
 
     def __init__(self, gpu: Gpu) -> None:
-        self._context = gpu.context
+        self._context, self._shaders = gpu.context, gpu.shaders
         self._finished = Screen(gpu)
-        self._program = gpu.shaders.program("screen.vert", "depth.frag")
-        self._array = self._finished.array(self._program)
         self.hide(WHOLE[:0])
+
+    @cached_property
+    def _array(self) -> moderngl.VertexArray:
+        """Compiled where the first tile is done."""
+        return self._finished.array(self._shaders.program("screen.vert", "depth.frag"))
 
     def hide(self, regions: NDArray[np.float32]) -> None:
         """The (R, 4) regions that are done."""
@@ -75,5 +80,5 @@ class TileMask:
         target.framebuffer.use()
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = "1"
-        self._program["screen_depth"] = depth
+        self._array.program["screen_depth"] = depth
         self._finished.draw(self._array)
