@@ -11,6 +11,7 @@ from defshade_cli.errors import UsageError
 from defshade_cli.passes.view import camera_depth, clip_from_camera
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.light import DomeLight
 from defshade_cli.settings import RenderSettings
 from defshade_cli.spaces import translation
 
@@ -116,6 +117,14 @@ def test_shadow_maps_are_coarser_the_more_there_are(lights: int, side: int) -> N
     """Each bulb sees all around by six maps; a sample draws some 64 million texels, until maps are the coarsest."""
     plan = make_plan(replace(SCENE, lights=(bulb(0, 0, 0.5),) * lights), RenderSettings())
     assert plan.shadow_resolution == side
+
+
+@pytest.mark.parametrize(("opacity", "side"), [(1.0, 1024), (0.5, 512)])
+def test_maps_of_a_dome_are_coarser_where_casters_let_light_through(opacity: float, side: int) -> None:
+    sky = DomeLight(path="/sky", world_from_light=np.eye(4), color=(1, 1, 1))
+    under = replace(SCENE, lights=(sky,), materials=(replace(GREY, opacity=opacity),))
+    plan = make_plan(under, RenderSettings())
+    assert plan.maps_a_sample > 64 and plan.shadow_resolution == side
 
 
 @pytest.mark.parametrize(("samples", "side"), [(1, 1024), (2, 512), (15, 512), (16, 1024)])

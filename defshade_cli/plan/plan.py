@@ -222,7 +222,7 @@ class Plan:
     @property
     def shadow_resolution(self) -> int:
         """Texels along the side of each shadow map."""
-        return shadow_resolution(self.lights, self.samples)
+        return shadow_resolution(self.lights, self.samples, thin=self.cutout)
 
     @property
     def maps_a_sample(self) -> int:

@@ -26,14 +26,15 @@ CUBE_FACES = 6
 """Maps of a point that has geometry all around."""
 
 _SKY_MAPS = 4
-"""Of a dome, that make maps coarser: it may draw more of them, as fine."""
+"""Of a dome, that make maps coarser: it may draw more of them, as fine, since solid casters cost little a texel."""
 
 
-def shadow_resolution(lights: Sequence[PlannedLight], samples: int) -> int:
-    """Texels along the side of each map, a power of two."""
-    counted = sum(min(count_maps(p), _SKY_MAPS if isinstance(p.light, DomeLight) else math.inf) for p in lights)
+def shadow_resolution(lights: Sequence[PlannedLight], samples: int, *, thin: bool) -> int:
+    """Texels along the side of each map, a power of two. thin: some casters may let light through, texel by texel."""
+    sky_maps = math.inf if thin else _SKY_MAPS
+    counted = sum(min(count_maps(p), sky_maps if isinstance(p.light, DomeLight) else math.inf) for p in lights)
     side = math.sqrt(_TEXELS / max(counted, 1))
-    return min(max(2 ** round(math.log2(side)), COARSEST), FINE if samples in _FEW else FINEST)
+    return min(max(2 ** math.ceil(math.log2(side) - 0.5), COARSEST), FINE if samples in _FEW else FINEST)
 
 
 def count_maps(planned: PlannedLight) -> int:
