@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,8 @@ _DIRECTIONS = 8
 """Of each lobe of a pixel."""
 _PARTS, _PARTS_BESIDE_RAYS = (0.5, 0.35, 0.15), (0.5, 0.0, 0.5)
 """Of the directions, that are drawn by luminance, by lobes and by the diffuse; and where rays serve the lobes."""
-_IS_MIRROR = np.arange(2 * _DIRECTIONS) < _DIRECTIONS
+_NORMALS = 6
+"""Normals count as alike within about one over it, or cells times pixels would be many."""
 _DIELECTRIC_F0 = 0.04
 
 
@@ -46,26 +47,51 @@ def scout(plan: Plan) -> Plan:
 
 def sky_guides(planes: Planes, plan: Plan) -> SkyGuides:
     """Densities over the cells of each dome's sky; planes: of `scout(plan)`."""
-    directions, shares = _looked_along(planes, plan)
-    if not len(shares):
+    seen = _seen(planes, plan)
+    if not len(seen.diffuse):
         return NO_GUIDES
     return {
-        dome.light: _guide(dome.light, directions, shares, _PARTS_BESIDE_RAYS if dome.by_rays else _PARTS)
+        dome.light: _guide(dome.light, seen, _PARTS_BESIDE_RAYS if dome.by_rays else _PARTS)
         for dome in plan.domes
         if isinstance(dome.light, DomeLight)
     }
 
 
-def _guide(dome: DomeLight, directions: Array, shares: Array, parts: Sequence[float]) -> GridDistribution:
-    sky = sky_of(dome)
-    local = transform_directions(rigid(dome.world_from_light).T, directions.reshape(-1, 3))
-    cells = sky.cell_of(local)
-    seen = shares * sky.luminance[cells].reshape(shares.shape)
-    total = seen.sum(axis=1, keepdims=True)
-    seen /= total + 0.1 * total.mean() + 1e-300
-    mirrored, scattered = (_counted(cells, seen * lobe, sky) for lobe in (_IS_MIRROR, ~_IS_MIRROR))
-    weighed = zip(parts, (sky.power, mirrored, scattered), strict=True)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """What P covered pixels look along, in world space, and reflect of it.
+
+    normals: (P, 3).  diffuse: (P,) albedo.
+    mirrored: (P, K, 3) directions drawn by the lobe.  specular: (P, K) what it reflects of each.
+    """
+
+    normals: Array
+    diffuse: Array
+    mirrored: Array
+    specular: Array
+
+
+def _guide(dome: DomeLight, seen: _Seen, parts: Sequence[float]) -> GridDistribution:
+    """Each pixel counts by what it sees of a cell over all that it sees; the diffuse is known for each cell."""
+    sky, local_from_world = sky_of(dome), rigid(dome.world_from_light).T
+    cells = sky.cell_of(transform_directions(local_from_world, seen.mirrored.reshape(-1, 3)))
+    mirrored = seen.specular * sky.luminance[cells].reshape(seen.specular.shape)
+    normals, of_pixel = _alike(transform_directions(local_from_world, seen.normals))
+    cosines = np.maximum(sky.directions.reshape(-1, 3) @ normals.T, 0.0)
+    irradiance = sky.power.ravel() @ cosines
+    total = mirrored.mean(axis=1) + seen.diffuse * irradiance[of_pixel] / math.pi
+    total += 0.1 * total.mean() + 1e-300
+    by_lobes = _counted(cells, mirrored / total[:, None], sky)
+    by_diffuse = sky.power * (cosines @ np.bincount(of_pixel, seen.diffuse / total)).reshape(sky.power.shape)
+    weighed = zip(parts, (sky.power, by_lobes, by_diffuse), strict=True)
     return GridDistribution(sum(part * weights / max(weights.sum(), 1e-300) for part, weights in weighed))
+
+
+def _alike(normals: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Some (N, 3) means of those that lie together, and which of them stands for each of (P, 3)."""
+    _, of = np.unique(np.round(normals * _NORMALS), axis=0, return_inverse=True)
+    of = of.ravel()
+    return normalize(np.column_stack([np.bincount(of, column) for column in normals.T])), of
 
 
 def _counted(cells: tuple[NDArray[np.intp], NDArray[np.intp]], seen: Array, sky: Environment) -> Array:
@@ -81,28 +107,23 @@ def _blurred(counts: Array) -> Array:
     return (padded[:-2] + padded[1:-1] + padded[2:]) / 3.0
 
 
-def _looked_along(planes: Planes, plan: Plan) -> tuple[Array, Array]:
-    """(P, 2K, 3) directions in world space that the covered pixels' lobes sample, and the (P, 2K) share of each.
-
-    They are drawn in the camera's space, so that they move as all does.
-    """
+def _seen(planes: Planes, plan: Plan) -> _Seen:
+    """Directions are drawn in the camera's space, so that they move as all does."""
     covered = np.isfinite(planes["depth"][..., 0])
     base, normal = (planes[name][covered].astype(np.float64) for name in ("base", "normal"))
     rays = camera_positions(planes["depth"], plan.camera)[covered]
     if plan.camera.projection == "orthographic":
         rays = np.broadcast_to([0.0, 0.0, -1.0], rays.shape)
     v, n = -normalize(rays), normalize(transform_directions(plan.camera.camera_from_world, normal[:, :3]))
-    u = np.random.default_rng(0).random((2, len(n), _DIRECTIONS))
-    mirrored = _mirrored(v, n, normal[:, 3], u)
-    scattered = _scattered(n, u)
+    mirrored = _mirrored(v, n, normal[:, 3], np.random.default_rng(0).random((2, len(n), _DIRECTIONS)))
     metallic, luminance = base[:, 3], base[:, :3] @ LUMINANCE
     f0 = planes["specular"][covered][:, :3] @ LUMINANCE if "specular" in planes else np.full(len(n), _DIELECTRIC_F0)
     f0 = f0 + (luminance - f0) * metallic
     edge = (1.0 - np.clip((n * v).sum(axis=1), 0.0, 1.0)) ** 5
-    shares = np.stack([f0 + (1.0 - f0) * edge, luminance * (1.0 - metallic)], axis=1).repeat(_DIRECTIONS, axis=1)
-    directions = np.concatenate([mirrored, scattered], axis=1)
-    shares = shares * ((directions * n[:, None]).sum(axis=2) > 0.0)
-    return transform_directions(plan.camera.world_from_camera, directions), shares
+    specular = (f0 + (1.0 - f0) * edge)[:, None] * ((mirrored * n[:, None]).sum(axis=2) > 0.0)
+    world_from_camera = plan.camera.world_from_camera
+    mirrored, n = transform_directions(world_from_camera, mirrored), transform_directions(world_from_camera, n)
+    return _Seen(n, luminance * (1.0 - metallic), mirrored, specular)
 
 
 def _mirrored(v: Array, n: Array, roughness: Array, u: Array) -> Array:
@@ -111,11 +132,6 @@ def _mirrored(v: Array, n: Array, roughness: Array, u: Array) -> Array:
     tangent = alpha * np.sqrt(u[0] / (1.0 - u[0]))
     h = _around(n, tangent, np.ones_like(tangent), u[1])
     return 2.0 * (h * v[:, None]).sum(axis=2, keepdims=True) * h - v[:, None]
-
-
-def _scattered(n: Array, u: Array) -> Array:
-    """(P, K, 3): by the cosine."""
-    return _around(n, np.sqrt(u[0]), np.sqrt(1.0 - u[0]), u[1])
 
 
 def _around(n: Array, across: Array, along: Array, turn: Array) -> Array:

@@ -72,12 +72,17 @@ class Environment:
         Ramamoorthi & Hanrahan 2001, "An Efficient Representation for Irradiance Environment Maps": within 1 % on
         average for natural skies.
         """
+        basis = harmonics(self.directions)
+        return _COSINE_LOBE[:, None] * np.einsum("hwk,hw,hwc->kc", basis, self._solid_angles, self._cells)
+
+    @cached_property
+    def directions(self) -> NDArray[np.float64]:
+        """(h, w, 3) unit, to the middles of the cells."""
         sine = 0.5 * (self._sines[1:] + self._sines[:-1])[:, None]
         longitude = 0.5 * (self._longitudes[1:] + self._longitudes[:-1])[None, :]
         cosine = np.sqrt(1.0 - sine * sine)
         x, y, z = np.broadcast_arrays(np.sin(longitude) * cosine, sine, np.cos(longitude) * cosine)
-        basis = harmonics(np.stack([x, y, z], axis=-1))
-        return _COSINE_LOBE[:, None] * np.einsum("hwk,hw,hwc->kc", basis, self._solid_angles, self._cells)
+        return np.stack([x, y, z], axis=-1)
 
     @cached_property
     def _fine(self) -> NDArray[np.float32]:
