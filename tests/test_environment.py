@@ -84,3 +84,15 @@ def test_harmonics_are_orthonormal() -> None:
     d = rng.normal(size=(200_000, 3))
     y = harmonics(d / np.linalg.norm(d, axis=1, keepdims=True))
     assert_allclose(4 * math.pi * (y.T @ y) / len(d), np.eye(9), atol=0.02)  # 1/√200000 of noise, times 4π
+
+
+def test_balanced_directions_have_the_harmonics_of_their_sky() -> None:
+    """However few; a diffuse surface sees little else of the sky."""
+    rng = np.random.default_rng(3)
+    sky = Environment(rng.random((16, 32, 3), np.float32) ** 8)
+    drawn = [sky.sample(tuple(u)) for u in rng.random((64, 2))]
+    directions, radiance = (np.array([sample[k] for sample in drawn]) for k in (0, 1))
+    factor = 1.0 + harmonics(directions) @ sky.balance(directions, radiance)
+    moments = harmonics(directions).T @ (factor * radiance) / len(drawn)
+    cosine = np.array([np.pi, *[2.0 * np.pi / 3.0] * 3, *[np.pi / 4.0] * 5])
+    assert_allclose(cosine[:, None] * moments, sky.irradiance_sh, atol=1e-9)

@@ -17,12 +17,17 @@ from defshade_cli.passes.shadow_cameras import ShadowExtent, shadow_cameras
 from defshade_cli.passes.sky_guide import NO_GUIDES, SkyGuides
 from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.distribution import GridDistribution
 from defshade_cli.scene.emission import Emitter, emitter_at, far_field, sky_emitter
+from defshade_cli.scene.environment import Environment
 from defshade_cli.scene.light import DomeLight, RectLight
 from defshade_cli.scene.mesh_light import MeshLight
 from defshade_cli.scene.radiance_map import RadianceMap
 from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import Window
+
+_MOST_BALANCED = 4096
+"""Directions of a sky, which are all drawn before the first sample."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,9 +62,10 @@ def _emitters(
     """One for most lights; some directions for a dome, and none where its analytic term stands in for them."""
     light = planned.light
     if isinstance(light, DomeLight):
-        count = planned.points
+        count, sky, guide = planned.points, sky_of(light), guides.get(light)
+        balance = _sky_balance(sky, guide, number, count, plan.samples) if count else None
         places = [sample.on_light(number, k, count) for k in range(count)]
-        directions = [sky_emitter(light, sky_of(light), u[:2], 1.0 / count, guides.get(light)) for u in places]
+        directions = [sky_emitter(light, sky, u[:2], 1.0 / count, guide, balance) for u in places]
         return [direction.shared_by(plan.samples) for direction in directions]
     if plan.samples * planned.points == 1:
         return [far_field(light)]
@@ -70,6 +76,17 @@ def _emitters(
         mean = _mean_weight(light.radiance_map, number, planned.points, plan.samples)
         points = [replace(point, intensity=point.intensity / mean) for point in points]
     return [point.one_of(planned.points).shared_by(plan.samples) for point in points]
+
+
+@lru_cache(maxsize=2)
+def _sky_balance(
+    sky: Environment, density: GridDistribution | None, number: int, points: int, count: int
+) -> NDArray[np.float64] | None:
+    """Of all directions of a sky in `count` samples; None where they are so many that they hardly need it."""
+    if points * count > _MOST_BALANCED:
+        return None
+    drawn = [sky.sample(s.on_light(number, k, points)[:2], density) for s in samples(count) for k in range(points)]
+    return sky.balance(np.array([sample[0] for sample in drawn]), np.array([sample[1] for sample in drawn]))
 
 
 @lru_cache(maxsize=16)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.scene.distribution import GridDistribution
-from defshade_cli.scene.environment import Environment
+from defshade_cli.scene.environment import Environment, harmonics
 from defshade_cli.scene.light import (
     CylinderLight,
     DiskLight,
@@ -116,10 +116,20 @@ def emitter_at(light: Light, u: Place, towards: Vector, *, inside: bool = True) 
 
 
 def sky_emitter(
-    light: DomeLight, sky: Environment, u: tuple[float, float], share: float, density: GridDistribution | None = None
+    light: DomeLight,
+    sky: Environment,
+    u: tuple[float, float],
+    share: float,
+    density: GridDistribution | None = None,
+    balance: Vector | None = None,
 ) -> Emitter:
-    """A direction of the dome drawn by its sky's radiance, or by a `density`, bearing `share` of the whole."""
+    """A direction of the dome drawn by its sky's radiance, or by a `density`, bearing `share` of the whole.
+
+    balance: of all directions of a render, see Environment.balance.
+    """
     direction, weight, extent = sky.sample(u, density)
+    if balance is not None:
+        weight = weight * np.maximum(1.0 + harmonics(direction) @ balance, 0.0)
     axis = -normalize(light.world_from_light[:3, :3] @ direction)
     return Emitter(light.position, axis, axis, "uniform", light.emission * weight * share, extent * share)
 

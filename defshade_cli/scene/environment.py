@@ -72,8 +72,25 @@ class Environment:
         Ramamoorthi & Hanrahan 2001, "An Efficient Representation for Irradiance Environment Maps": within 1 % on
         average for natural skies.
         """
-        basis = harmonics(self.directions)
-        return _COSINE_LOBE[:, None] * np.einsum("hwk,hw,hwc->kc", basis, self._solid_angles, self._cells)
+        return _COSINE_LOBE[:, None] * self._moments
+
+    def balance(self, directions: NDArray[np.float64], radiance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(9, 3) of harmonics, whose sum and 1 are a factor by which drawn directions have the sky's own harmonics.
+
+        directions: (N, 3).  radiance: (N, 3) over their density, as `sample` gives them. What N directions have too
+        much of the sky's nine first harmonics, which a diffuse surface sees little beyond, is theirs by chance alone:
+        calibration, as in Deville & Särndal 1992, "Calibration Estimators in Survey Sampling". It vanishes as N grows.
+        """
+        basis = harmonics(directions)
+        missing = self._moments - basis.T @ radiance / len(basis)
+        products = np.einsum("nk,nc,nl->ckl", basis, radiance, basis) / len(basis)
+        channels = zip(products, missing.T, strict=True)
+        return np.column_stack([np.linalg.lstsq(a, b, rcond=1e-6)[0] for a, b in channels])
+
+    @cached_property
+    def _moments(self) -> NDArray[np.float64]:
+        """(9, 3) of the sky's radiance in real spherical harmonics."""
+        return np.einsum("hwk,hw,hwc->kc", harmonics(self.directions), self._solid_angles, self._cells)
 
     @cached_property
     def directions(self) -> NDArray[np.float64]:
