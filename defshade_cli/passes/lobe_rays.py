@@ -82,7 +82,10 @@ class LampStore:
         self._lamps, self._cells = RecordBuffer(gpu, LAMPS), RecordBuffer(gpu, CELLS)
 
     def update(self, plan: Plan, towards: NDArray[np.float64], tables: LightTables) -> NDArray[Any]:
-        """Make the plan's lamps resident. Returns their Light records, which are to be bound where rays are drawn."""
+        """Make the plan's lamps resident. towards: (3,) as for `emitter_at`.
+
+        Returns their Light records (N,), which are to be bound where rays are drawn.
+        """
         records, cells = lamp_records(plan.lamps, plan.samples, plan.camera.position, towards)
         self._lamps.write(records)
         self._cells.write(cells)

@@ -46,7 +46,7 @@ class Lamp:
 
 
 def lamp_of(light: Light, towards: NDArray[np.float64], *, inside: bool = True) -> Lamp | None:
-    """None for a light without a size, or whose shape is none of these. towards, inside: as for `emitter_at`."""
+    """None for a light without a size, or whose shape is none of these. towards: (3,), inside: as for `emitter_at`."""
     if light.spread <= 0.0 or light.size_factor == 0.0:
         return None
     match light:
