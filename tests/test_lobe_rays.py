@@ -10,6 +10,7 @@ from build import at, camera, drawable, quad, rotated, scene, sphere
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.passes.lobe_rays import in_texels
 from defshade_cli.passes.pipeline import Pipeline
+from defshade_cli.passes.screen import WHOLE
 from defshade_cli.plan import Plan, make_plan
 from defshade_cli.scene.environment import Environment
 from defshade_cli.scene.light import (
@@ -224,3 +225,25 @@ def test_a_floor_does_not_hide_the_sky_from_itself(pipeline: Pipeline, far: floa
     of = scene([quad(3.0), *[quad(1.0, -far)] * bool(far)], [DOME], [metal], camera(4.9))
     image = pipeline.render(of, planned(of, 4)).layers["beauty"]
     assert image[..., :3].mean() > 0.95
+
+
+def test_surfaces_too_rough_for_small_lamps_send_no_rays() -> None:
+    def limit(radius: float) -> float:
+        lamp = SphereLight(**COMMON, world_from_light=at(0.0, 0.0, 10.0), radius=radius)
+        return planned(scene([quad()], [lamp], [GLOSSY])).roughest_rays
+
+    assert limit(0.5) == pytest.approx(np.sqrt(4.0 * 0.05)) and limit(5.0) == 0.7
+    assert planned(scene([quad()], [DOME], [GLOSSY])).roughest_rays == 0.7
+
+
+def test_tiles_that_send_no_rays_are_not_missed(pipeline: Pipeline, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A glossy ball in one tile of a rough wall: the picture is that of rays from all tiles."""
+    meshes = [quad(3.0, -1.0), sphere(0.3, rings=8)]
+    placed = [drawable(meshes[0], material=1), drawable(meshes[1], 1, 0, [at(0.8, 0.8, 0.0)])]
+    of = scene(meshes, [LAMPS["rect"], DOME], [GLOSSY, Material("/rough", roughness=1.0)], drawables=placed)
+    plan = make_plan(of, replace(SETTINGS, size=(96, 96), samples=2))
+    sharp = pipeline.render(of, plan).layers["beauty"]
+    monkeypatch.setattr("defshade_cli.passes.sharp_tiles.regions_of", lambda *_: WHOLE)
+    np.testing.assert_array_equal(sharp, pipeline.render(of, plan).layers["beauty"])
+    monkeypatch.setattr("defshade_cli.passes.sharp_tiles.regions_of", lambda *_: WHOLE[:0])
+    assert not np.array_equal(sharp, pipeline.render(of, plan).layers["beauty"])

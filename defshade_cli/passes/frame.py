@@ -26,7 +26,7 @@ class Frame:
         self._gbuffers: dict[tuple[tuple[Plane, ...], Layout], GBuffer] = {}
         self._radiance: dict[tuple[str, GBuffer | None], Target] = {}
         self._lights: tuple[tuple[Any, ...], LightTargets | None] = (), None
-        self._ranges: Target | None = None
+        self._tiles: dict[str, Target] = {}
         self._runs: moderngl.Texture | None = None
 
     def gbuffer(self, size: Size, planes: tuple[Plane, ...], layout: Layout) -> GBuffer:
@@ -48,13 +48,14 @@ class Frame:
             self._radiance[key] = allocate(self._gpu, size, {"radiance": (components, "f4")}, depth)
         return self._radiance[key]
 
-    def depth_ranges(self, tiles: Size) -> Target:
-        """A texture "range" of two floats for each of (columns, rows) tiles. Raises GpuError."""
-        if self._ranges is None or self._ranges.framebuffer.size != tiles:
-            if self._ranges:
-                self._ranges.release()
-            self._ranges = allocate(self._gpu, tiles, {"range": (2, "f4")})
-        return self._ranges
+    def of_tiles(self, name: str, components: int, tiles: Size) -> Target:
+        """A texture `name` of so many floats for each of (columns, rows) tiles. Raises GpuError."""
+        known = self._tiles.get(name)
+        if known is None or known.framebuffer.size != tiles:
+            if known:
+                known.release()
+            self._tiles[name] = allocate(self._gpu, tiles, {name: (components, "f4")})
+        return self._tiles[name]
 
     def tile_runs(self, tiles: Size) -> moderngl.Texture:
         """A texture of two integers for each of (columns, rows) tiles."""

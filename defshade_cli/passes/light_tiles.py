@@ -110,7 +110,7 @@ class DepthRangesPass:
 
     def read(self, gbuffer: GBuffer, frame: Frame, size: tuple[int, int]) -> NDArray[np.float64]:
         """(rows, columns, 2) nearest and farthest planar depth, the other way round in tiles without geometry."""
-        target = frame.depth_ranges((-(-size[0] // TILE), -(-size[1] // TILE)))
+        target = frame.of_tiles("range", 2, (-(-size[0] // TILE), -(-size[1] // TILE)))
         target.framebuffer.use()
         self._context.enable_only(moderngl.NOTHING)
         gbuffer.bind(self._array.program)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.outputs import outputs_source
-from defshade_cli.gpu.planes import read_source
+from defshade_cli.gpu.planes import read_source, uses_standard_depth
 from defshade_cli.gpu.residence import BOXES, CELLS, LAMPS, TRIANGLES, RecordBuffer
 from defshade_cli.gpu.shaders import set_uniforms
 from defshade_cli.image.environment import sky_of
@@ -161,14 +161,16 @@ class LampRaysPass:
 
     def draw(self, plan: Plan, gbuffer: GBuffer, targets: LightTargets, rays: LobeRays, tables: LightTables) -> None:
         """Add what all lamps show in lobes; their Light records are bound."""
-        self._context.enable_only(moderngl.BLEND)
+        self._context.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
         self._context.blend_func = moderngl.ONE, moderngl.ONE
+        self._context.depth_func = "!="
+        background = 1.0 if uses_standard_depth(gbuffer.layout) else 0.0
         first = 0
         for groups, lamps in groupby(plan.lamps, key=lambda planned: planned.groups):
             count = len(list(lamps))
             targets.of(groups).use()
             gbuffer.bind(self._program, ies_tables=tables.candela)
-            set_uniforms(self._program, {**rays.uniforms(plan), "lamp_run": (first, count)})
+            set_uniforms(self._program, {**rays.uniforms(plan), "lamp_run": (first, count), "screen_depth": background})
             self._screen.draw(self._array)
             first += count
 

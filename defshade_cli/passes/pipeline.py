@@ -34,6 +34,7 @@ from defshade_cli.passes.sampling import CENTRE, Sample, samples
 from defshade_cli.passes.screen import WHOLE, Screen, TileMask
 from defshade_cli.passes.shadow_atlas import ShadowAtlas
 from defshade_cli.passes.shadows import ShadowPass, ShadowVariant
+from defshade_cli.passes.sharp_tiles import SharpTilesPass
 from defshade_cli.passes.sky_guide import NO_GUIDES, SkyGuides, scout, sky_guides
 from defshade_cli.passes.sky_textures import SkyTextures
 from defshade_cli.passes.sky_visibility import SkyVisibility, SkyVisibilityPass
@@ -69,16 +70,17 @@ class Pipeline:
         self._view = RecordBuffer(gpu, VIEW)
         self._lights = RecordBuffer(gpu, LIGHTS)
         self._motions = RecordBuffer(gpu, MOTIONS)
-        self._screen, self._mask = Screen(gpu), TileMask(gpu)
+        self._screen, self._sharp, self._mask = Screen(gpu), Screen(gpu), TileMask(gpu)
         self._skies, self._trees, self._lamps = SkyTextures(gpu), TreeStore(gpu), LampStore(gpu)
         self._gbuffer_pass = cache(lambda variant: GBufferPass(gpu, variant))
         self._emission_pass = cache(lambda variant: EmissionPass(gpu, variant, self._screen))
         self._lighting_pass = cache(lambda variant: LightingPass(gpu, variant, self._screen))
         self._environment_pass = cache(lambda variant: EnvironmentPass(gpu, variant, self._screen, self._skies))
         self._sky_rays_pass = cache(
-            lambda variant, hidden: SkyRaysPass(gpu, variant, self._screen, self._skies, hidden=hidden)
+            lambda variant, hidden: SkyRaysPass(gpu, variant, self._sharp, self._skies, hidden=hidden)
         )
-        self._lamp_rays_pass = cache(lambda variant, hidden: LampRaysPass(gpu, variant, self._screen, hidden=hidden))
+        self._lamp_rays_pass = cache(lambda variant, hidden: LampRaysPass(gpu, variant, self._sharp, hidden=hidden))
+        self._sharp_tiles_pass = cache(lambda variant: SharpTilesPass(gpu, variant))
         self._sky_visibility_pass = cache(lambda variant: SkyVisibilityPass(gpu, variant, self._screen))
         self._shadow_pass = cache(lambda variant: ShadowPass(gpu, variant))
         self._light_tiles = LightTiles(gpu, self._frame)
@@ -229,6 +231,8 @@ class Pipeline:
                 self._lighting_pass(variant).add(lights, gbuffer, targets, shadows, tables)
             if openness and visibility and shadows:
                 openness.add(lights, plan, gbuffer, visibility, shadows)
+        if canvas.rays:
+            self._sharp.cover(self._sharp_tiles_pass(variant).regions(plan, gbuffer, self._frame))
         for dome in plan.domes:
             environment = self._environment_pass(EnvironmentVariant.of(plan, dome))
             first_link = tables.links.lights.get(dome.light, ALL_LINKED)

@@ -35,6 +35,7 @@ def view_record(plan: Plan, layout: Layout, sample: Sample = CENTRE) -> NDArray[
     view["sample_index"] = sample.index
     view["sky_share"] = plan.sky_share
     view["lobe_rays"] = plan.lobe_rays * plan.samples
+    view["roughest_rays"] = plan.roughest_rays
     view["pixel_share"] = plan.pixel_share
     return view
 

@@ -77,7 +77,7 @@ def _explain_rays(plan: Plan) -> Decision:
         few = "no dome, no lamp large enough for the lobes there are, or opacity, linked shadows or too many triangles"
         return Decision("rays along lobes", "skipped", few)
     seen = sum(planned.by_rays for planned in plan.lights)
-    reason = f"sharp lobes see {seen} of {len(plan.lights)} lights by them"
+    reason = f"lobes below roughness {plan.roughest_rays:.2f} see {seen} of {len(plan.lights)} lights by them"
     return Decision("rays along lobes", f"{plan.lobe_rays} a sample", reason)
 
 

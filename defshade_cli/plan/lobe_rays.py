@@ -7,6 +7,7 @@ small lamps as well, at half the price.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -37,6 +38,9 @@ LARGE = 0.12
 NARROW = 0.5
 """Alpha of the narrowest lobe, over a lamp's radius over distance: lobes wider than that see it as a point."""
 
+ROUGHEST = 0.7
+"""Roughness of lobes that find any light as well by what all pixels share."""
+
 
 def seen_by_rays(
     lights: Sequence[PlannedLight], scene: Scene, settings: RenderSettings, *, thin: bool
@@ -46,6 +50,15 @@ def seen_by_rays(
         return tuple(lights)
     chosen = {planned.number for planned in (*_domes(lights, scene, settings), *_lamps(lights, scene, settings))}
     return tuple(replace(planned, by_rays=planned.number in chosen) for planned in lights)
+
+
+def roughest_rays(lights: Iterable[PlannedLight], scene: Scene) -> float:
+    """Roughness from which on surfaces send no rays: alpha is twice what sees the largest lamp as a point."""
+    seen = [planned.light for planned in lights if planned.by_rays]
+    if any(isinstance(light, DomeLight) for light in seen):
+        return ROUGHEST
+    largest = max((apparent_size(light, scene.bounds) for light in seen), default=0.0)
+    return min(math.sqrt(2.0 * largest / NARROW), ROUGHEST)
 
 
 def _domes(lights: Iterable[PlannedLight], scene: Scene, settings: RenderSettings) -> list[PlannedLight]:

@@ -18,7 +18,7 @@ from defshade_cli.plan.cost import choose_lighting
 from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.groups import light_groups, light_outputs
 from defshade_cli.plan.lights import PlannedLight, plan_lights
-from defshade_cli.plan.lobe_rays import seen_by_rays
+from defshade_cli.plan.lobe_rays import roughest_rays, seen_by_rays
 from defshade_cli.plan.moments import count_moments, share_moments
 from defshade_cli.plan.opacity import is_transparent, thin_materials, thin_numbers
 from defshade_cli.plan.points import pixel_share, rays_a_sample
@@ -57,6 +57,7 @@ class Plan:
     lights: sorted quads, spheres, cones.  lighting: how they are drawn.
     shadows: some light casts them.  shadow_linked: in some light not all geometry does.
     lobe_rays: of a pixel in a sample, by which lobes see some lights; 0 where they see none so.
+    roughest_rays: roughness of surfaces from which on they see none so.
     background: domes are seen where no geometry is.
     thin: numbers of the materials whose opacity may be below 1.  transparent: it scales the diffuse of some alone.
     solid: how many have opacity from an image that is 1 where they read it, see plan/solidity.py.
@@ -92,6 +93,7 @@ class Plan:
     shadows: bool
     shadow_linked: bool
     lobe_rays: int
+    roughest_rays: float
     background: bool
     thin: tuple[int, ...]
     solid: int
@@ -281,6 +283,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         shadows=shadows,
         shadow_linked=shadows and scene.shadow_linked,
         lobe_rays=rays_a_sample(settings) if any(planned.by_rays for planned in lights) else 0,
+        roughest_rays=roughest_rays(lights, scene),
         background=settings.background,
         thin=thin_numbers(scene, thin),
         solid=len(solid),

@@ -11,10 +11,10 @@ float coat_rays(Surface s, float NoV) {
 #endif
 }
 
-// Of a pixel's samples, the share that sends rays: lobes as wide as these find the sky by the directions that pixels share.
+// Of a pixel's samples, the share that sends rays: wide lobes find lights by the points and directions that pixels share.
 float ray_share(Surface s, vec3 v) {
     if (dot(s.normal, v) < MIN_NOV) return 0.0;
-    return 1.0 - smoothstep(0.5, 0.7, sharpest_roughness(s));
+    return 1.0 - smoothstep(5.0 / 7.0 * view.roughest_rays, view.roughest_rays, sharpest_roughness(s));
 }
 
 // Heitz 2018, "Sampling the GGX Distribution of Visible Normals", eq. 17: G1 D / (4 NoV) by solid angle of the light.

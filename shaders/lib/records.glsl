@@ -12,6 +12,7 @@ struct View {
     float pixel_share;         // of a pixel, that a sample's highlights stand for; plan/points.py
     float sky_share;           // of a dome, that four of its directions stand for
     float lobe_rays;           // of a pixel, in all samples together
+    float roughest_rays;       // roughness from which on a surface sends none
 };
 
 struct Instance {
