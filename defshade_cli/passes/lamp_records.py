@@ -41,8 +41,8 @@ def lamp_records(
 
 
 def _set_shape(row: np.void, lamp: Lamp, eye: NDArray[np.float64]) -> None:
-    relative_from_lamp = lamp.world_from_lamp.copy()
-    relative_from_lamp[:3, 3] -= eye
-    row["x"], row["y"], row["z"] = np.linalg.inv(relative_from_lamp)[:3]
+    lamp_from_world = np.linalg.inv(lamp.world_from_lamp[:3, :3])
+    offset = lamp_from_world @ (eye - lamp.world_from_lamp[:3, 3])
+    row["x"], row["y"], row["z"] = np.column_stack([lamp_from_world, offset])
     row["shape"] = _SHAPES.index(lamp.shape)
     row["radius"], row["stretch"], row["bias"] = lamp.radius, lamp.stretch, lamp.bias

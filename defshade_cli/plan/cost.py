@@ -25,9 +25,11 @@ TILE_PIXEL, TILE_LIGHT = 45.0, 6.5
 WHOLE_DRAW, WHOLE_LIGHT, LIGHTS_A_DRAW = 30.0, 5.5, 12
 """ns a pixel of a draw of the whole image, and of each of its lights, of which it has so many at most."""
 
-
 _WORTHWHILE = 2**18
 """Pixels of all samples; for fewer a shader in which lights are written out takes longer to compile than it saves."""
+
+_LARGEST = 1e5
+"""Sides of an orthographic view, that a volume may reach."""
 
 
 def choose_lighting(
@@ -46,12 +48,22 @@ def choose_lighting(
     }
     if pixels * settings.most_samples < _WORTHWHILE:
         del costs["whole"]
+    if not _can_be_clipped(lights, camera):
+        del costs["volumes"]
     return min(costs, key=costs.__getitem__)
 
 
 def _count_kinds(lights: Sequence[PlannedLight], settings: RenderSettings) -> int:
     """Of lights that tiles draw apart: by their groups, shape and shadows."""
     return len({(p.groups, p.light.shaping is not None, settings.shadows and p.light.is_infinite) for p in lights})
+
+
+def _can_be_clipped(lights: Sequence[PlannedLight], camera: Camera) -> bool:
+    """Are all volumes small enough for a rasteriser that clips in float32? Perspective views widen towards them."""
+    left, right, bottom, top = camera.window
+    reaches = [planned.reach for planned in lights if math.isfinite(planned.reach)]
+    largest = _LARGEST * min(right - left, top - bottom)
+    return camera.projection == "perspective" or max(reaches, default=0.0) < largest
 
 
 def covered_share(lights: Sequence[PlannedLight], camera: Camera) -> float:
