@@ -193,7 +193,7 @@ def read_source(planes: Sequence[Plane], layout: Layout) -> str:
         [
             '#include "lib/encode.glsl"',
             *samplers,
-            f"const float BACKGROUND_DEPTH = {1.0 if uses_standard_depth(layout) else 0.0};",
+            f"const float BACKGROUND_DEPTH = {background_depth(layout)};",
             "",
             "Surface read_planes(ivec2 pixel) {",
             "    Surface s;",
@@ -214,3 +214,8 @@ def integer_attachments(planes: Sequence[Plane], layout: Layout) -> list[int]:
 def uses_standard_depth(layout: Layout) -> bool:
     """The seed compares depth with LESS, 0 at the near plane; the other layouts reverse it."""
     return layout == "rgba8"
+
+
+def background_depth(layout: Layout) -> float:
+    """What is stored where nothing is drawn."""
+    return 1.0 if uses_standard_depth(layout) else 0.0

@@ -183,13 +183,21 @@ def _level(image: oiio.ImageInput, side: int) -> int:
 
 
 def _four_channels(pixels: NDArray[Any]) -> NDArray[Any]:
-    """As the UsdUVTexture schema says: one channel repeats, two are gray and alpha, a missing alpha is 1."""
-    channels = pixels.shape[2]
     four = np.empty((*pixels.shape[:2], 4), pixels.dtype)
-    for channel in range(3):
-        four[..., channel] = pixels[..., channel if channels >= 3 else 0]
-    four[..., 3] = pixels[..., -1] if channels in (2, 4) else 255 if pixels.dtype == np.uint8 else 1
+    for number, channel in enumerate("rgba"):
+        place, one = place_of(channel, pixels.shape[2]), 255 if pixels.dtype == np.uint8 else 1
+        four[..., number] = one if place is None else pixels[..., place]
     return four
+
+
+def place_of(channel: str, channels: int) -> int | None:
+    """Of r, g, b or a in a file of so many channels; None for an alpha that it lacks, which is 1.
+
+    As the UsdUVTexture schema says: one channel repeats, two are gray and alpha.
+    """
+    if channel == "a":
+        return channels - 1 if channels in (2, 4) else None
+    return "rgb".index(channel) if channels >= 3 else 0
 
 
 def _in_light(texels: NDArray[Any]) -> NDArray[Any]:

@@ -8,7 +8,7 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from defshade_cli.image.texture import opened
+from defshade_cli.image.texture import opened, place_of
 from defshade_cli.scene.texture import Channel, ImageFile
 
 _CELLS = 512
@@ -47,7 +47,7 @@ def _stamp(file: ImageFile) -> int:
 def _looked_at(file: ImageFile, channel: Channel) -> NDArray[np.bool_]:
     with opened(file) as image:
         spec = image.spec()
-        at = _place(spec.nchannels, channel)
+        at = place_of(channel[0], spec.nchannels)
         if at is None:
             return np.zeros((1, 1), bool)
         kind, one = (oiio.UINT8, 255) if spec.format == oiio.UINT8 else (oiio.FLOAT, 1.0)
@@ -62,10 +62,3 @@ def _in_cells(below: NDArray[np.bool_]) -> NDArray[np.bool_]:
     size = -(-max(below.shape) // _CELLS)
     rows, columns = (np.arange(0, side, size) for side in below.shape)
     return np.logical_or.reduceat(np.logical_or.reduceat(below, rows, axis=0), columns, axis=1)
-
-
-def _place(channels: int, channel: Channel) -> int | None:
-    """Of the channel in a file, by the rules of UsdUVTexture; None for an alpha that it lacks, which is 1."""
-    if channel == "a":
-        return channels - 1 if channels in (2, 4) else None
-    return "rgb".index(channel[0]) if channels >= 3 else 0

@@ -19,6 +19,11 @@ _SLACK = 1e-4
 """Relative, for what float32 rounds in the shaders."""
 
 
+def tile_grid(size: tuple[int, int]) -> tuple[int, int]:
+    """(columns, rows) of the tiles of an image of (width, height)."""
+    return -(-size[0] // TILE), -(-size[1] // TILE)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class LightBounds:
     """Volumes of L lights in camera space.

@@ -16,18 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.outputs import outputs_source
 from defshade_cli.gpu.planes import read_source
 from defshade_cli.gpu.records import record
 from defshade_cli.gpu.residence import LIGHT_BLOCK, LIGHT_LISTS, RecordBuffer
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer
-from defshade_cli.passes.light_lists import TILE, LightBounds, list_lights, tile_boxes
+from defshade_cli.passes.light_lists import TILE, LightBounds, list_lights, tile_boxes, tile_grid
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.light_traits import Traits, common_traits, lights_source
 from defshade_cli.passes.lighting import LightingVariant
 from defshade_cli.passes.screen import Screen, regions_of
-from defshade_cli.passes.shadow_atlas import ShadowAtlas, kind_of, shadow_source
+from defshade_cli.passes.shadow_atlas import ShadowAtlas, kind_of
 from defshade_cli.passes.tables import NO_TABLES, LightTables
 from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.settings import Layout
@@ -110,7 +109,7 @@ class DepthRangesPass:
 
     def read(self, gbuffer: GBuffer, frame: Frame, size: tuple[int, int]) -> NDArray[np.float64]:
         """(rows, columns, 2) nearest and farthest planar depth, the other way round in tiles without geometry."""
-        target = frame.of_tiles("range", 2, (-(-size[0] // TILE), -(-size[1] // TILE)))
+        target = frame.of_tiles("range", 2, tile_grid(size))
         target.framebuffer.use()
         self._context.enable_only(moderngl.NOTHING)
         gbuffer.bind(self._array.program)
@@ -119,12 +118,7 @@ class DepthRangesPass:
 
 
 def _compile(gpu: Gpu, variant: LightingVariant, common: Traits, most: int) -> moderngl.Program:
-    generated = {
-        "generated/planes.glsl": read_source(variant.planes, variant.layout),
-        "generated/outputs.glsl": outputs_source(variant.outputs, variant.groups),
-        "generated/lights.glsl": lights_source(most, common),
-        **shadow_source(variant.shadows),
-    }
+    generated = {**variant.generated, "generated/lights.glsl": lights_source(most, common)}
     defines = [*variant.defines, *variant.distances, f"LIGHT_TILE {TILE}"]
     return gpu.shaders.program("screen.vert", "lighting_tiles.frag", defines=defines, generated=generated)
 

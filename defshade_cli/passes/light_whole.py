@@ -14,15 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.outputs import outputs_source
-from defshade_cli.gpu.planes import read_source, uses_standard_depth
+from defshade_cli.gpu.planes import background_depth
 from defshade_cli.gpu.residence import LIGHT_BLOCK, RecordBuffer
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.light_traits import Traits, traits_of, written_out_source
 from defshade_cli.passes.lighting import LightingVariant
 from defshade_cli.passes.screen import Screen
-from defshade_cli.passes.shadow_atlas import ShadowAtlas, kind_of, shadow_source
+from defshade_cli.passes.shadow_atlas import ShadowAtlas, kind_of
 from defshade_cli.passes.tables import NO_TABLES, LightTables
 from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.plan.cost import LIGHTS_A_DRAW
@@ -58,7 +57,7 @@ class WholeLighting:
             targets.of(lights[members[0]].groups).use()
             atlas = shadows.bind(array.program) if shadows else None
             gbuffer.bind(array.program, shadow_atlas=atlas, ies_tables=tables.candela)
-            array.program["screen_depth"] = 1.0 if uses_standard_depth(gbuffer.layout) else 0.0
+            array.program["screen_depth"] = background_depth(gbuffer.layout)
             self._block.write(records[members])
             self._screen.draw(array)
 
@@ -75,11 +74,6 @@ def _draws(lights: Sequence[PlannedLight], records: NDArray[Any]) -> Iterator[tu
 
 
 def _compile(gpu: Gpu, variant: LightingVariant, each: tuple[Traits, ...]) -> moderngl.Program:
-    generated = {
-        "generated/planes.glsl": read_source(variant.planes, variant.layout),
-        "generated/outputs.glsl": outputs_source(variant.outputs, variant.groups),
-        "generated/lights.glsl": written_out_source(each),
-        **shadow_source(variant.shadows),
-    }
+    generated = {**variant.generated, "generated/lights.glsl": written_out_source(each)}
     defines = [*variant.defines, *variant.distances]
     return gpu.shaders.program("screen.vert", "lighting_whole.frag", defines=defines, generated=generated)

@@ -108,6 +108,15 @@ class LightingVariant:
         return [plane.define for plane in self.planes] + flags + output_defines(self.outputs)
 
     @property
+    def generated(self) -> dict[str, str]:
+        """What a shader that adds light to the targets includes."""
+        return {
+            "generated/planes.glsl": read_source(self.planes, self.layout),
+            "generated/outputs.glsl": outputs_source(self.outputs, self.groups),
+            **shadow_source(self.shadows),
+        }
+
+    @property
     def distances(self) -> list[str]:
         """The macros of a shader for all the volumes at once."""
         return ["VOLUME_QUAD" if self.volumes == ("quad",) else "VOLUMES_MIXED"] * ("quad" in self.volumes)
@@ -118,16 +127,11 @@ class LightingPass:
 
     def __init__(self, gpu: Gpu, variant: LightingVariant, screen: Screen) -> None:
         self._context, self._screen = gpu.context, screen
-        generated = {
-            "generated/planes.glsl": read_source(variant.planes, variant.layout),
-            "generated/outputs.glsl": outputs_source(variant.outputs, variant.groups),
-            **shadow_source(variant.shadows),
-        }
         self._volumes: dict[Volume, moderngl.VertexArray] = {}
         for volume in variant.volumes:
             defines = variant.defines + ["VOLUME_QUAD"] * (volume == "quad")
             files = (f"light_{volume}.vert", "lighting.frag")
-            program = gpu.shaders.program(*files, defines=defines, generated=generated)
+            program = gpu.shaders.program(*files, defines=defines, generated=variant.generated)
             self._volumes[volume] = screen.array(program) if volume == "quad" else volume_array(gpu, volume, program)
 
     def add(

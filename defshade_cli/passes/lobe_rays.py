@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.outputs import outputs_source
-from defshade_cli.gpu.planes import read_source, uses_standard_depth
+from defshade_cli.gpu.planes import background_depth
 from defshade_cli.gpu.residence import BOXES, CELLS, LAMPS, TRIANGLES, RecordBuffer
 from defshade_cli.gpu.shaders import set_uniforms
 from defshade_cli.image.environment import sky_of
@@ -30,7 +29,6 @@ from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.lighting import LightingVariant
 from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.screen import Screen
-from defshade_cli.passes.shadow_atlas import shadow_source
 from defshade_cli.passes.sky_guide import SkyGuides
 from defshade_cli.passes.sky_textures import SkyTextures
 from defshade_cli.passes.tables import LightTables
@@ -164,7 +162,7 @@ class LampRaysPass:
         self._context.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
         self._context.blend_func = moderngl.ONE, moderngl.ONE
         self._context.depth_func = "!="
-        background = 1.0 if uses_standard_depth(gbuffer.layout) else 0.0
+        background = background_depth(gbuffer.layout)
         first = 0
         for groups, lamps in groupby(plan.lamps, key=lambda planned: planned.groups):
             count = len(list(lamps))
@@ -178,9 +176,4 @@ class LampRaysPass:
 def _sources(variant: LightingVariant, defines: Iterable[str]) -> tuple[list[str], dict[str, str]]:
     """Defines and generated files of shaders/lobe_rays.frag."""
     variant = replace(variant, shadows=(), shadow_styles=False)
-    generated = {
-        "generated/planes.glsl": read_source(variant.planes, variant.layout),
-        "generated/outputs.glsl": outputs_source(variant.outputs, variant.groups),
-        **shadow_source(variant.shadows),
-    }
-    return [*variant.defines, "VOLUME_QUAD", *defines], generated
+    return [*variant.defines, "VOLUME_QUAD", *defines], variant.generated

@@ -10,7 +10,7 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import read_source
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer
-from defshade_cli.passes.light_lists import TILE
+from defshade_cli.passes.light_lists import TILE, tile_grid
 from defshade_cli.passes.lighting import LightingVariant
 from defshade_cli.passes.screen import Screen, regions_of
 from defshade_cli.plan import Plan
@@ -28,7 +28,7 @@ class SharpTilesPass:
 
     def regions(self, plan: Plan, gbuffer: GBuffer, frame: Frame) -> NDArray[np.float32]:
         """(R, 4) of the image, as Screen.cover takes them."""
-        target = frame.of_tiles("roughness", 1, (-(-plan.size[0] // TILE), -(-plan.size[1] // TILE)))
+        target = frame.of_tiles("roughness", 1, tile_grid(plan.size))
         target.framebuffer.use()
         self._context.enable_only(moderngl.NOTHING)
         gbuffer.bind(self._array.program)

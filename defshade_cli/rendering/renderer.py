@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.colour import DisplayTransform
@@ -64,6 +65,7 @@ def _display(gpu: Gpu, shader: DisplayShader) -> DisplayPass:
     """With a table, where one is kept or can be."""
     from defshade_cli.image.display_table import kept_table
 
-    exact = DisplayPass(gpu, shader)
-    table = kept_table(shader, lambda pixels: exact.show(pixels, straight=False).astype(np.float32))
-    return exact if table is None else DisplayPass(gpu, shader, table)
+    def show(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
+        return DisplayPass(gpu, shader).show(pixels, straight=False).astype(np.float32)
+
+    return DisplayPass(gpu, shader, kept_table(shader, show))

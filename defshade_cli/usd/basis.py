@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.usd.polygons import Primvar
+from defshade_cli.usd.values import places_in_runs
 
 if TYPE_CHECKING:  # scipy is a quarter of a second to import, and not every stage has curves
     from scipy import sparse
@@ -105,8 +106,7 @@ def sample_curves(kind: Kind, counts: NDArray[np.int64], points: int, detail: in
     detail = 1 if kind.basis == "linear" else detail
     segments = kind.segments(counts)
     rows = segments * detail + np.where(segments > 0, not kind.closed, 0)
-    curve = np.repeat(np.arange(len(counts)), rows)
-    place = np.arange(len(curve)) - np.repeat(np.cumsum(rows) - rows, rows)
+    curve, place = places_in_runs(rows)
     segment = np.minimum(place // detail, segments[curve] - 1)
     return sample_at(kind, counts, points, Places(curve, segment, (place - segment * detail) / detail))
 
@@ -134,8 +134,7 @@ def control_samples(kind: Kind, counts: NDArray[np.int64], points: int, closed: 
     """A sample at every control point (P,), as if the curves were lines between these, closed ones or open."""
     segments = kind.segments(counts)
     rows = np.where(segments > 0, counts, 0)
-    curve = np.repeat(np.arange(len(counts)), rows)
-    place = np.arange(len(curve)) - np.repeat(np.cumsum(rows) - rows, rows)
+    curve, place = places_in_runs(rows)
     along = place * segments[curve] / np.maximum(counts - (0 if kind.closed else 1), 1)[curve]
     segment = np.minimum(along.astype(np.intp), segments[curve] - 1)
     samples = sample_at(kind, counts, points, Places(curve, segment, along - segment))

@@ -18,7 +18,7 @@ from defshade_cli.usd.nurbs import homogeneous_points
 from defshade_cli.usd.polygons import Primvar
 from defshade_cli.usd.primvars import DISPLAY_COLOR, NOTHING_CARRIED, fit, read_carried
 from defshade_cli.usd.strands import Strands
-from defshade_cli.usd.values import integers
+from defshade_cli.usd.values import integers, places_in_runs
 
 NURBS_CURVES_ATTRIBUTES = (*CURVES_ATTRIBUTES, "order", "knots", "ranges", "pointWeights")
 """What is read of NurbsCurves that may vary over time, besides primvars."""
@@ -132,7 +132,7 @@ def _projected(homogeneous: Array) -> Array:
 def _samples(splines: _Splines) -> _Samples:
     """The beginning of every line, and the end of each curve's last."""
     counts, degrees = splines.counts, splines.degrees
-    curve, place = _run_places(counts - degrees)
+    curve, place = places_in_runs(counts - degrees)
     sizes = counts + degrees + 1
     span = (np.cumsum(sizes) - sizes + degrees)[curve] + place
     low = np.maximum(splines.knots[span], splines.ranges[curve, 0])
@@ -140,14 +140,8 @@ def _samples(splines: _Splines) -> _Samples:
     drawn = low < high
     curve, span, low, high = curve[drawn], span[drawn], low[drawn], high[drawn]
     steps = np.where(degrees[curve] == 1, 1, _STEPS_A_DEGREE * degrees[curve])
-    row, step = _run_places(steps + (np.diff(curve, append=-1) != 0))
+    row, step = places_in_runs(steps + (np.diff(curve, append=-1) != 0))
     return _Samples(curve[row], span[row], low[row] + (high - low)[row] * (step / steps[row]))
-
-
-def _run_places(lengths: Integers) -> tuple[Integers, Integers]:
-    """(N,) of each element of runs of such lengths, its run, and its place in that."""
-    run = np.repeat(np.arange(len(lengths)), lengths)
-    return run, np.arange(len(run)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
 
 
 def _weights(splines: _Splines, samples: _Samples) -> Weights:

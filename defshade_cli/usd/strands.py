@@ -31,6 +31,7 @@ from defshade_cli.usd.basis import (
 from defshade_cli.usd.polygons import Polygons, Primvar
 from defshade_cli.usd.primvars import Carried
 from defshade_cli.usd.tubes import following
+from defshade_cli.usd.values import places_in_runs
 
 Vectors = NDArray[np.float64]
 
@@ -95,8 +96,7 @@ class Strands:
     def _cut(self, points: Vectors, view: View) -> tuple[Places, NDArray[np.intp]]:
         """The ends of pieces, segment by segment, and which of them a piece starts at."""
         count = self.kind.segments(self.counts)
-        curve = np.repeat(np.arange(len(count)), count)
-        segment = np.arange(len(curve)) - np.repeat(np.cumsum(count) - count, count)
+        curve, segment = places_in_runs(count)
         whole = Places(curve, segment, np.zeros(len(curve)))
         controls = control_weights(self.kind, self.counts, len(points), whole)
         on_screen = np.stack([view.seen(weights @ points, _BEYOND) for weights in controls], axis=1)
@@ -133,8 +133,7 @@ def fractional_odd(levels: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArr
     """
     half = (levels + 1.0) / 2.0
     floor, ceiling = np.floor(half).astype(np.intp), np.ceil(half).astype(np.intp)
-    row = np.repeat(np.arange(len(levels)), 2 * ceiling)
-    point = np.arange(len(row)) - np.repeat(np.cumsum(2 * ceiling) - 2 * ceiling, 2 * ceiling)
+    row, point = places_in_runs(2 * ceiling)
     split = np.where(floor == 1, 0, 2 * _without_highest_bit(floor - 1) + 1)
     from_end = np.minimum(point, 2 * ceiling[row] - 1 - point)
     before = from_end - ((from_end > split[row]) & (floor != ceiling)[row])

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
+from defshade_cli.usd.values import places_in_runs
+
 Array = NDArray[np.float64]
 
 _WIDTHS = {"counts": 1, "orders": 1, "vertexCounts": 1, "knots": 1, "ranges": 2, "points": 3}
@@ -153,8 +155,8 @@ def _no_longer(loop: Array) -> Array:
     """(N, 2) the closed loop in segments of no more than _LONGEST."""
     ahead = np.roll(loop, -1, axis=0) - loop
     parts = np.ceil(np.linalg.norm(ahead, axis=1) / _LONGEST).astype(int)
-    part = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
-    return np.repeat(loop, parts, axis=0) + np.repeat(ahead, parts, axis=0) * (part / np.repeat(parts, parts))[:, None]
+    segment, part = places_in_runs(parts)
+    return loop[segment] + ahead[segment] * (part / parts[segment])[:, None]
 
 
 def _enclosed(points: Array, loops: list[Array]) -> NDArray[np.bool_]:

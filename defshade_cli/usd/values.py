@@ -57,3 +57,9 @@ def resembles(value: object, model: object) -> bool:
     if like.dtype.kind in "biuf":
         return array.dtype.kind in "biuf" and array.shape == like.shape
     return type(value) is type(model)
+
+
+def places_in_runs(lengths: NDArray[np.integer]) -> tuple[NDArray[np.intp], NDArray[np.int64]]:
+    """(N,) of each element of runs of such lengths (R,), its run, and its place in that."""
+    run = np.repeat(np.arange(len(lengths)), lengths)
+    return run, np.arange(len(run)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
