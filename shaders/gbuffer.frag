@@ -9,7 +9,9 @@
 #include "generated/planes.glsl"
 
 in vec3 normal_relative;
+#ifdef DISPLAY_COLOR_VARIES
 in vec4 display_color;
+#endif
 flat in Material authored;
 flat in uint material_index;
 flat in uint instance_index;
@@ -78,7 +80,10 @@ vec3 unit_normal(float side) {
 }
 
 void main() {
-    Material material = with_display(authored, display_color);
+    Material material = authored;
+#ifdef DISPLAY_COLOR_VARIES
+    material = with_display(material, display_color);
+#endif
     float side = gl_FrontFacing ? handedness : -handedness;
     vec3 normal = unit_normal(side);
     Detail detail = detail_of(normal);

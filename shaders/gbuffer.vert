@@ -39,7 +39,9 @@ flat out uint visible_row;
 in uvec2 draw;                 // instance, material
 
 out vec3 normal_relative;
+#ifdef DISPLAY_COLOR_VARIES
 out vec4 display_color;
+#endif
 flat out Material authored;    // a software rasteriser fetches it faster here than at each pixel
 flat out uint material_index;
 flat out uint instance_index;
@@ -58,14 +60,17 @@ void main() {
     Instance instance = instances[draw.x];
     vec4 position = instance.relative_from_object * vec4(position_object, 1.0);
     normal_relative = mat3(instance.relative_from_normal) * normal_object;
-    display_color = vec4(instance.display_color, instance.display_opacity);
-#ifdef DISPLAY_COLOR_VARIES
-    if (vertex_color.r >= 0.0) display_color.rgb = vertex_color.rgb;
-    if (vertex_color.a >= 0.0) display_color.a = vertex_color.a;
-#endif
     instance_index = draw.x;
     material_index = draw.y;
+    vec4 display = vec4(instance.display_color, instance.display_opacity);
+#ifdef DISPLAY_COLOR_VARIES
+    if (vertex_color.r >= 0.0) display.rgb = vertex_color.rgb;
+    if (vertex_color.a >= 0.0) display.a = vertex_color.a;
+    display_color = display;
     authored = materials[draw.y];
+#else
+    authored = with_display(materials[draw.y], display);
+#endif
     handedness = instance.handedness;
 #ifdef PLANE_LINKS
     link_set = instance.link_set;
