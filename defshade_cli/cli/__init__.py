@@ -12,6 +12,7 @@ A command is imported when it is called for, and a driver or a foreign library b
 
 from __future__ import annotations
 
+import atexit
 import difflib
 import gc
 import os
@@ -64,6 +65,22 @@ def defshade(context: click.Context) -> None:
     if context.invoked_subcommand is None:
         click.echo(context.get_help(), err=True)
         context.exit(UsageError.exit_code)
+
+
+def process() -> None:
+    """`main` as all that a process is for: what is written is closed, and the rest ends with the process.
+
+    To take USD, Mesa and the interpreter down piece by piece takes as long as to write a picture.
+    """
+    try:
+        main()
+    except SystemExit as ending:
+        if not (ending.code is None or isinstance(ending.code, int)):
+            raise
+        atexit._run_exitfuncs()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(ending.code or 0)
 
 
 def main() -> None:

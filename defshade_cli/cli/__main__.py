@@ -1,5 +1,5 @@
 """`python -m defshade_cli.cli`, for where the `defshade` script is not on the path."""
 
-from defshade_cli.cli import main
+from defshade_cli.cli import process
 
-main()
+process()
