@@ -15,7 +15,7 @@ import pytest
 from defshade_cli.errors import UsageError
 from defshade_cli.image.colour import display_transform, picture
 from defshade_cli.image.layers import LAYERS
-from defshade_cli.image.ocio import displays
+from defshade_cli.image.ocio import read_displays
 from films import film, layer_values
 
 SRGB, ACES, PLAIN = "sRGB - Display", "ACES 2.0 - SDR 100 nits (Rec.709)", "Un-tone-mapped"
@@ -119,8 +119,8 @@ def test_pictures_of_ids_motion_and_mattes() -> None:
 
 
 def test_displays_and_views_are_listed() -> None:
-    assert {ACES, PLAIN, "Raw"} <= set(displays()[SRGB])
-    assert display_transform("Display P3 - Display").view in displays()["Display P3 - Display"]
+    assert {ACES, PLAIN, "Raw"} <= set(read_displays().views[SRGB])
+    assert display_transform("Display P3 - Display").view in read_displays().views["Display P3 - Display"]
     assert display_transform().encoding == SRGB
 
 
@@ -133,9 +133,10 @@ def test_what_the_config_lacks_is_refused_with_what_it_has() -> None:
 
 def in_a_process_with(config: Path) -> subprocess.CompletedProcess[str]:
     code = (
-        "import numpy as np; from defshade_cli.image.ocio import displays\n"
+        "import numpy as np; from defshade_cli.image.ocio import read_displays\n"
         "from defshade_cli.image.colour import display_transform\n"
-        "print(displays(), display_transform().apply(np.full((1, 1, 3), 0.25, np.float32)).round(3).ravel().tolist())"
+        "shown = display_transform().apply(np.full((1, 1, 3), 0.25, np.float32))\n"
+        "print(read_displays().views, shown.round(3).ravel().tolist())"
     )
     environment = os.environ | {"OCIO": str(config)}
     return subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
@@ -143,7 +144,7 @@ def in_a_process_with(config: Path) -> subprocess.CompletedProcess[str]:
 
 def test_the_environments_config_holds(tmp_path: Path) -> None:
     (tmp_path / "studio.ocio").write_text(CONFIG)
-    assert in_a_process_with(tmp_path / "studio.ocio").stdout == "{'Wall': ('Root',)} [0.5, 0.5, 0.5]\n"
+    assert in_a_process_with(tmp_path / "studio.ocio").stdout == "{'Wall': {'Root': 'root'}} [0.5, 0.5, 0.5]\n"
 
 
 def test_a_config_that_is_missing_is_told(tmp_path: Path) -> None:

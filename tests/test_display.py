@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +12,10 @@ import OpenImageIO as oiio
 import pytest
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.image.colour import display_transform, displays
+from defshade_cli.image.colour import display_transform
 from defshade_cli.image.display_shader import DisplayShader, display_shader
 from defshade_cli.image.display_table import bake, kept_table
-from defshade_cli.image.ocio import find_render_space
+from defshade_cli.image.ocio import find_render_space, read_displays
 from defshade_cli.passes.display import DisplayPass
 from defshade_cli.rendering import pictures, run
 from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
@@ -20,7 +23,16 @@ from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
 STEP = 1 / 1023
 """Of ten bits."""
 
-VIEWS = [("sRGB - Display", view) for view in displays()["sRGB - Display"]]
+CONFIG = """\
+ocio_profile_version: 2
+roles: {scene_linear: lin_srgb, default: lin_srgb}
+file_rules: [!<Rule> {name: Default, colorspace: default}]
+displays:
+  Wall: [!<View> {name: Plain, colorspace: lin_srgb}]
+colorspaces: [!<ColorSpace> {name: lin_srgb, aliases: [lin_rec709_scene]}]
+"""
+
+VIEWS = [("sRGB - Display", view) for view in read_displays().views["sRGB - Display"]]
 
 
 def colours(alpha: bool) -> np.ndarray:
@@ -87,15 +99,15 @@ def test_a_table_is_within_half_a_step_where_it_is_used(gpu: Gpu) -> None:
     assert (table[:-1, :-1, :-1, 3] > 0.0).mean() < 0.06
 
 
-def test_a_table_is_baked_once_and_only_where_it_can_be_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_table_is_baked_once_where_it_can_be_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shader, baked = DisplayShader("vec4 display(vec4 color) { return color; }", ()), []
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     for _ in range(2):
         table = kept_table(shader, lambda pixels: baked.append(len(pixels)) or np.clip(pixels, 0.0, 1.0))
-    assert len(baked) == 1 and table is not None and table.shape == (65, 65, 65, 4)
+    assert len(baked) == 1 and table.shape == (65, 65, 65, 4)
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    assert kept_table(shader, lambda pixels: pixels) is None
+    assert np.array_equal(kept_table(shader, lambda pixels: pixels), bake(lambda pixels: pixels))
 
 
 def test_large_pictures_are_shown_by_the_device(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,3 +127,22 @@ def test_large_pictures_are_shown_by_the_device(tmp_path: Path, monkeypatch: pyt
         shown[least] = [oiio.ImageBuf(file).get_pixels(oiio.FLOAT) for file in files[:2]]
     for device, cpu in zip(*shown.values(), strict=True):
         np.testing.assert_allclose(device, cpu, atol=1.01 / 255)
+
+
+def test_what_opencolorio_answered_is_kept_but_of_configs_that_may_change(tmp_path: Path) -> None:
+    """A second picture loads neither the library nor a config, and a config in a file is asked each time."""
+    code = (
+        "import sys; from defshade_cli.image.colour import display_transform as transform\n"
+        "from defshade_cli.image.display_shader import display_shader\n"
+        "told = transform(); shader = display_shader(told)\n"
+        "print(told.encoding, hash((shader.source, *(t.values.tobytes() for t in shader.tables))), file=sys.stderr)\n"
+        "print('PyOpenColorIO' in sys.modules)"
+    )
+    told = []
+    (tmp_path / "own.ocio").write_text(CONFIG)
+    for config in ("", "", "ocio://default", str(tmp_path / "own.ocio"), str(tmp_path / "own.ocio")):
+        environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path), "OCIO": config, "PYTHONHASHSEED": "0"}
+        python = [sys.executable, "-c", code]
+        told.append(subprocess.run(python, env=environment, capture_output=True, text=True, check=True))
+    assert [each.stdout.strip() for each in told] == ["True", "False", "False", "True", "True"]
+    assert told[0].stderr == told[1].stderr == told[2].stderr

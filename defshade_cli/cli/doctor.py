@@ -50,12 +50,12 @@ def _package_versions() -> Iterator[str]:
 def _colour_config() -> str:
     """Where the OCIO configuration is from, and what pictures are shown with by default."""
     from defshade_cli.image.colour import display_transform
-    from defshade_cli.image.ocio import displays
+    from defshade_cli.image.ocio import read_displays
 
     source = os.environ.get("OCIO", "OpenImageIO's built-in config")
     try:
         shown = display_transform()
-        return f"{source}: {shown.display} / {shown.view} by default, {len(displays())} displays"
+        return f"{source}: {shown.display} / {shown.view} by default, {len(read_displays().views)} displays"
     except UsageError as error:
         return f"{source}: {error}"
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from defshade_cli.errors import UsageError
 from defshade_cli.image.false_colour import show_coordinates, show_ids, show_matte, show_vectors
 from defshade_cli.image.layers import ID, SCENE_UNITS, UNIT_VECTOR, Layer
-from defshade_cli.image.ocio import displays, encoding_of, read_config
+from defshade_cli.image.ocio import read_displays
 from defshade_cli.image.render_space import REC709, RenderSpace
 
 BRIGHTEST = 65504.0
@@ -37,7 +37,7 @@ class DisplayTransform:
     @property
     def encoding(self) -> str:
         """The colour space that pixels arrive in, for a file's header."""
-        return encoding_of(self.display, self.view, self.space.config)
+        return read_displays(self.space.config).views[self.display][self.view]
 
     def apply(self, pixels: Pixels, *, straight: bool = False) -> Pixels:
         """Scene-linear (H, W, 3 or 4), exposure applied → the same shape in [0, 1], encoded for the display.
@@ -77,15 +77,15 @@ def display_transform(
     display: str | None = None, view: str | None = None, look: str | None = None, space: RenderSpace = REC709
 ) -> DisplayTransform:
     """The config's defaults where nothing is chosen. Raises UsageError for a choice that the config lacks."""
-    config, valid = read_config(space.config), displays(space.config)
-    display = display or config.getDefaultDisplay()
-    if display not in valid:
-        raise UsageError(f"there is no display '{display}'; the OCIO config has {', '.join(valid)}")
-    view = view or config.getDefaultView(display)
-    if view not in valid[display]:
-        raise UsageError(f"display '{display}' has no view '{view}'; it has {', '.join(valid[display])}")
-    if look and look not in config.getLookNames():
-        raise UsageError(f"there is no look '{look}'; the OCIO config has {', '.join(config.getLookNames()) or 'none'}")
+    config = read_displays(space.config)
+    display = display or config.default
+    if display not in config.views:
+        raise UsageError(f"there is no display '{display}'; the OCIO config has {', '.join(config.views)}")
+    view, views = view or config.default_views[display], config.views[display]
+    if view not in views:
+        raise UsageError(f"display '{display}' has no view '{view}'; it has {', '.join(views)}")
+    if look and look not in config.looks:
+        raise UsageError(f"there is no look '{look}'; the OCIO config has {', '.join(config.looks) or 'none'}")
     return DisplayTransform(display, view, look or "", space)
 
 

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import PyOpenColorIO as ocio
 from numpy.typing import NDArray
 
 from defshade_cli.image.colour import DisplayTransform
-from defshade_cli.image.ocio import read_config
+from defshade_cli.image.kept import Arrays
+from defshade_cli.image.ocio import kept_answer, read_config
+
+if TYPE_CHECKING:
+    import PyOpenColorIO as ocio
 
 log = logging.getLogger("defshade")
+
+Texels = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,7 +29,7 @@ class Table:
     """
 
     sampler: str
-    values: NDArray[np.float32]
+    values: Texels
     smooth: bool
 
 
@@ -35,27 +41,44 @@ class DisplayShader:
     tables: tuple[Table, ...]
 
 
+class _NoShaderError(Exception):
+    """OpenColorIO's word on why."""
+
+
 def display_shader(transform: DisplayTransform) -> DisplayShader | None:
     """None for a transform that OpenColorIO makes no shader of; the log says why."""
     try:
-        return _shader(transform)
-    except ocio.Exception as error:
+        arrays = kept_answer(transform.space.config, f"shader {transform}", lambda: _shader(transform))
+    except _NoShaderError as error:
         log.info("%s, %s: %s", transform.display, transform.view, error)
         return None
+    source, smooth = str(arrays.pop("source")), arrays.pop("smooth")
+    tables = (Table(sampler, values, sampler in smooth) for sampler, values in arrays.items())
+    return DisplayShader(source, tuple(tables))
 
 
-def _shader(transform: DisplayTransform) -> DisplayShader:
+def _shader(transform: DisplayTransform) -> Arrays:
+    """The source, which samplers are smooth, and what they read by their names. Raises _NoShaderError."""
+    import PyOpenColorIO as ocio
+
     description = ocio.GpuShaderDesc.CreateShaderDesc(
         language=ocio.GPU_LANGUAGE_GLSL_4_0, functionName="display", resourcePrefix="ocio_"
     )
     description.setAllowTexture1D(False)
-    _processor(transform).getDefaultGPUProcessor().extractGpuShaderInfo(description)
-    flat = (_table(texture, (texture.height, texture.width)) for texture in description.getTextures())
-    deep = (_table(texture, (texture.edgeLen,) * 3) for texture in description.get3DTextures())
-    return DisplayShader(description.getShaderText(), (*flat, *deep))
+    try:
+        _processor(transform).getDefaultGPUProcessor().extractGpuShaderInfo(description)
+    except ocio.Exception as error:
+        raise _NoShaderError(str(error)) from error
+    flat, deep = list(description.getTextures()), list(description.get3DTextures())
+    smooth = [texture.samplerName for texture in (*flat, *deep) if texture.interpolation != ocio.INTERP_NEAREST]
+    told = {"source": np.array(description.getShaderText()), "smooth": np.array(smooth, str)}
+    told |= {texture.samplerName: _values(texture, texture.height, texture.width) for texture in flat}
+    return told | {texture.samplerName: _values(texture, *[texture.edgeLen] * 3) for texture in deep}
 
 
 def _processor(transform: DisplayTransform) -> ocio.Processor:
+    import PyOpenColorIO as ocio
+
     config = read_config(transform.space.config)
     shown = ocio.DisplayViewTransform(transform.space.name, transform.display, transform.view)
     pipeline = ocio.LegacyViewingPipeline()
@@ -65,6 +88,5 @@ def _processor(transform: DisplayTransform) -> ocio.Processor:
     return pipeline.getProcessor(config)
 
 
-def _table(texture: ocio.GpuShaderDesc.Texture | ocio.GpuShaderDesc.Texture3D, shape: tuple[int, ...]) -> Table:
-    values = np.array(texture.getValues(), np.float32).reshape(*shape, -1)
-    return Table(texture.samplerName, values, texture.interpolation != ocio.INTERP_NEAREST)
+def _values(texture: ocio.GpuShaderDesc.Texture | ocio.GpuShaderDesc.Texture3D, *shape: int) -> Texels:
+    return np.array(texture.getValues(), np.float32).reshape(*shape, -1)

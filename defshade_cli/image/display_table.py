@@ -7,8 +7,6 @@ or in none, is for the transform. Baking takes as long as showing a large pictur
 
 from __future__ import annotations
 
-import hashlib
-import logging
 from collections.abc import Callable
 from itertools import product
 from typing import TYPE_CHECKING
@@ -16,13 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.image.appearing import appearing_at
-from defshade_cli.resources import cache_folder
+from defshade_cli.image.kept import kept
 
 if TYPE_CHECKING:
     from defshade_cli.image.display_shader import DisplayShader
-
-log = logging.getLogger("defshade")
 
 CELLS = 64
 """Along each axis."""
@@ -38,18 +33,9 @@ Show = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 """The transform itself: (H, W, 3) scene-linear → shown."""
 
 
-def kept_table(shader: DisplayShader, show: Show) -> Lattice | None:
-    """The table of what `shader` does, baked by `show` the first time; None where it could not be kept for the next."""
-    path = cache_folder("displays") / f"{_key(shader)}.npy"
-    try:
-        if not path.exists():
-            table = bake(show)
-            with appearing_at(path) as hidden:
-                np.save(hidden, table)
-        return np.asarray(np.load(path))
-    except (OSError, ValueError) as error:
-        log.info("pictures are shown without a table: %s", error)
-        return None
+def kept_table(shader: DisplayShader, show: Show) -> Lattice:
+    """The table of what `shader` does, baked by `show` the first time."""
+    return kept("displays", _told(shader), lambda: {"table": bake(show)})["table"]
 
 
 def bake(show: Show) -> Lattice:
@@ -80,8 +66,6 @@ def _coarse(errors: NDArray[np.float32]) -> NDArray[np.bool_]:
     return np.any([far[z : z + span : 2, y : y + span : 2, x : x + span : 2] for z, y, x in corners], axis=0)
 
 
-def _key(shader: DisplayShader) -> str:
-    told = hashlib.blake2b(f"{CELLS} {TOE} {MOST} {NEAR_ENOUGH}\n{shader.source}".encode(), digest_size=16)
-    for table in shader.tables:
-        told.update(np.ascontiguousarray(table.values).tobytes())
-    return told.hexdigest()
+def _told(shader: DisplayShader) -> bytes:
+    told = f"{CELLS} {TOE} {MOST} {NEAR_ENOUGH}\n{shader.source}".encode()
+    return told + b"".join(table.values.tobytes() for table in shader.tables)

@@ -6,8 +6,12 @@ stands for $OCIO's, else for that. OpenImageIO takes four times as long to open 
 
 from __future__ import annotations
 
+import json
 import os
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
 from functools import cache
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +19,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from defshade_cli.errors import UsageError
+from defshade_cli.image.kept import Arrays, kept
 from defshade_cli.image.render_space import LINEAR_REC709, Matrix3, RenderSpace
 
 if TYPE_CHECKING:
@@ -23,7 +28,21 @@ if TYPE_CHECKING:
 _DEFAULT, _BUILT_IN = "ocio://default", "ocio://cg-config-v4.0.0_aces-v2.0_ocio-v2.5"
 """What OpenImageIO takes for the default: its OpenColorIO may be older than the one beside it."""
 
+_IN_LIBRARY = "ocio://"
 _NAMED_AS_DISPLAY = "<USE_DISPLAY_NAME>"
+
+
+@dataclass(frozen=True, slots=True)
+class Displays:
+    """What a config shows pictures on.
+
+    views: of each display, and the colour space that pixels have which it shows.  default_views: by display.
+    """
+
+    default: str
+    views: Mapping[str, Mapping[str, str]]
+    default_views: Mapping[str, str]
+    looks: tuple[str, ...]
 
 
 @cache
@@ -31,11 +50,60 @@ def read_config(name: str = "") -> ocio.Config:
     """What a config says. Raises UsageError for one that cannot be read."""
     import PyOpenColorIO as ocio
 
-    chosen = name or os.environ.get("OCIO") or _DEFAULT
     try:
-        return ocio.Config.CreateFromFile(_BUILT_IN if chosen == _DEFAULT else chosen)
+        return ocio.Config.CreateFromFile(_chosen(name))
     except (ocio.Exception, ocio.ExceptionMissingFile) as error:
         raise UsageError(f"the OCIO config cannot be used: {error}") from error
+
+
+@cache
+def read_displays(name: str = "") -> Displays:
+    """Raises UsageError for a config that cannot be read."""
+    told = kept_answer(name, "displays", lambda: {"json": np.array(json.dumps(asdict(_displays(read_config(name)))))})
+    said = json.loads(str(told["json"]))
+    return Displays(**said | {"looks": tuple(said["looks"])})
+
+
+def _displays(config: ocio.Config) -> Displays:
+    views = {
+        display: {view: _encoding(config, display, view) for view in config.getViews(display)}
+        for display in config.getDisplays()
+    }
+    defaults = {display: config.getDefaultView(display) for display in views}
+    return Displays(config.getDefaultDisplay(), views, defaults, tuple(config.getLookNames()))
+
+
+def _encoding(config: ocio.Config, display: str, view: str) -> str:
+    space = str(config.getDisplayViewColorSpaceName(display, view))
+    return display if space == _NAMED_AS_DISPLAY else space
+
+
+def kept_answer(name: str, question: str, answer: Callable[[], Arrays]) -> Arrays:
+    """What OpenColorIO answers about a config. What is built in stays the same, so such answers are kept on disk.
+
+    To load the library and a config takes longer than to draw a small picture.
+    """
+    chosen = _chosen(name)
+    return (
+        kept("ocio", f"{_library()} {chosen} {question}".encode(), answer)
+        if chosen.startswith(_IN_LIBRARY)
+        else answer()
+    )
+
+
+@cache
+def _library() -> str:
+    """Which OpenColorIO there is, without loading it: the files of its package."""
+    spec = find_spec("PyOpenColorIO")
+    assert spec and spec.submodule_search_locations
+    with os.scandir(spec.submodule_search_locations[0]) as entries:
+        files = [(entry.path, entry.stat().st_size, entry.stat().st_mtime_ns) for entry in entries if entry.is_file()]
+    return repr(sorted(files))
+
+
+def _chosen(name: str) -> str:
+    chosen = name or os.environ.get("OCIO") or _DEFAULT
+    return _BUILT_IN if chosen == _DEFAULT else chosen
 
 
 @cache
@@ -45,18 +113,6 @@ def open_config(name: str = "") -> oiio.ColorConfig:
     if reason := config.geterror():
         raise UsageError(f"the OCIO config cannot be used: {reason}")
     return config
-
-
-def displays(name: str = "") -> dict[str, tuple[str, ...]]:
-    """The config's displays, each with its views. Raises UsageError for a config that cannot be read."""
-    config = read_config(name)
-    return {display: tuple(config.getViews(display)) for display in config.getDisplays()}
-
-
-def encoding_of(display: str, view: str, name: str = "") -> str:
-    """The colour space that pixels have which a view of a display shows."""
-    space = str(read_config(name).getDisplayViewColorSpaceName(display, view))
-    return display if space == _NAMED_AS_DISPLAY else space
 
 
 def linear_spaces(name: str = "") -> tuple[str, ...]:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.colour import DisplayTransform
+from defshade_cli.image.display_shader import DisplayShader, display_shader
+from defshade_cli.image.display_table import kept_table
 from defshade_cli.passes.display import DisplayPass
 from defshade_cli.passes.pipeline import Pipeline
-
-if TYPE_CHECKING:
-    from defshade_cli.image.display_shader import DisplayShader
 
 
 class Renderer:
@@ -48,8 +47,6 @@ class Renderer:
     def display(self, device: int | None, transform: DisplayTransform) -> DisplayPass | None:
         """The pass that shows images, on a device that a pipeline is of; None where there is no shader for it."""
         if (device, transform) not in self._displays:
-            from defshade_cli.image.display_shader import display_shader
-
             shader = display_shader(transform)
             self._displays[device, transform] = _display(self._gpus[device], shader) if shader else None
         return self._displays[device, transform]
@@ -63,7 +60,6 @@ class Renderer:
 
 def _display(gpu: Gpu, shader: DisplayShader) -> DisplayPass:
     """With a table, where one is kept or can be."""
-    from defshade_cli.image.display_table import kept_table
 
     def show(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
         return DisplayPass(gpu, shader).show(pixels, straight=False).astype(np.float32)
