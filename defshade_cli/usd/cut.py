@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple, TypeGuard
-
-import numpy as np
+from typing import NamedTuple
 
 from defshade_cli.scene.geometry import Mesh
-from defshade_cli.usd.polygons import Polygons, Primvar
+from defshade_cli.usd.polygons import Polygons
 from defshade_cli.usd.small_meshes import Shaped
 from defshade_cli.usd.subsets import FaceGroup, Faces
 from defshade_cli.usd.triangulation import triangulate
+from defshade_cli.usd.vertices import vertices_of
 
 
 class Cut(NamedTuple):
@@ -56,36 +55,12 @@ def cut(
 ) -> Cut:
     """Triangles over the points, or over the corners where something on the mesh splits points.
 
-    polygons: with normals, unless `shaped` has them.  shaped: what is known of them; they have no holes then.
+    polygons: with normals, unless `shaped` is known of them.
     """
-    if shaped and shaped.corners:
-        known = shaped.corners
-        mesh = Mesh(path, known.points, known.normals, known.triangles, known.faces, double_sided=double_sided)
-        return Cut(polygons, faces, known.split, *faces.sort(mesh), ())
     issues: list[str] = []
-    whole = polygons.without_holes().joined()
-    corners, face = shaped.triangles if shaped else triangulate(whole, issues)
-    if whole.left_handed:
-        corners = corners[:, ::-1]
-    split = any(primvar.splits_points for primvar in whole.primvars)
-    place = whole.at_corners if split else whole.at_points
-    color, opacity, normals = whole.display_color, whole.display_opacity, whole.normals
-    assert normals is not None
-    mesh = Mesh(
-        path=path,
-        points=whole.points[whole.indices] if split else whole.points,
-        normals=place(normals),
-        triangles=(corners if split else whole.indices[corners]).astype(np.uint32),
-        faces=whole.faces[face],
-        display_color=place(color) if varies(color) else None,
-        display_opacity=place(opacity) if varies(opacity) else None,
-        uvs={name: place(uv) for name, uv in whole.uvs.items()},
-        primvars={name: place(primvar) for name, primvar in whole.shown.items()},
-        double_sided=double_sided,
-    )
-    return Cut(polygons, faces, split, *faces.sort(mesh), tuple(issues))
-
-
-def varies(primvar: Primvar | None) -> TypeGuard[Primvar]:
-    """Does it differ over the mesh?"""
-    return primvar is not None and primvar.interpolation != "constant"
+    if shaped:
+        drawn = shaped.vertices
+    else:
+        whole = polygons.without_holes().joined()
+        drawn = vertices_of(whole, triangulate(whole, issues))
+    return Cut(polygons, faces, drawn.split, *faces.sort(drawn.mesh(path, double_sided=double_sided)), tuple(issues))

@@ -21,12 +21,12 @@ from defshade_cli.scene.geometry import Mesh
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.control import CONTROL_ATTRIBUTES, Control, read_control, smooth_control
 from defshade_cli.usd.copies import Copies
-from defshade_cli.usd.cut import Cut, cut, varies
+from defshade_cli.usd.cut import Cut, cut
 from defshade_cli.usd.flatness import mean_edge, rise
 from defshade_cli.usd.gprims import read_solid, size_attributes
 from defshade_cli.usd.mesh import MESH_ATTRIBUTES, read_mesh
 from defshade_cli.usd.normals import with_normals
-from defshade_cli.usd.polygons import Polygons, Primvar
+from defshade_cli.usd.polygons import Polygons, Primvar, varying
 from defshade_cli.usd.positions import is_carried_by_velocities, read_positions
 from defshade_cli.usd.primvars import (
     DISPLAY_COLOR,
@@ -161,10 +161,10 @@ def tessellate(
 ) -> Gprim:
     """The surface in triangles; without a refiner its cage.
 
-    last: an earlier one, of which is kept what fits.  shaped: what is known of polygons that are not refined.
+    last: an earlier one, of which is kept what fits.  shaped: what is known of it, and then taken whole.
     """
     if shaped:
-        refined = surface.polygons if shaped.corners else replace(surface.polygons, normals=shaped.normals)
+        refined, last = shaped.polygons, None
     else:
         refined = with_normals(refiner.refine(surface.polygons) if refiner else surface.polygons)
     polygons = shared(refined, last.cut.polygons) if last else refined
@@ -301,4 +301,4 @@ def _attributes(prim: Usd.Prim) -> tuple[str, ...]:
 
 
 def _constant(primvar: Primvar | None) -> NDArray[np.float32] | None:
-    return None if primvar is None or varies(primvar) else primvar.values[0]
+    return None if primvar is None or varying(primvar) else primvar.values[0]

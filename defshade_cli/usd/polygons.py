@@ -154,8 +154,8 @@ class Polygons:
 
     def without_constants(self) -> Polygons:
         """Without the colour and the opacity that all of it has; a surface knows those."""
-        color = _unless_constant(self.display_color)
-        opacity = _unless_constant(self.display_opacity)
+        color = varying(self.display_color)
+        opacity = varying(self.display_opacity)
         if color is self.display_color and opacity is self.display_opacity:
             return self
         return replace(self, display_color=color, display_opacity=opacity)
@@ -220,5 +220,6 @@ class Polygons:
         return np.broadcast_to(primvar.values, (len(self.points), *primvar.values.shape[1:]))
 
 
-def _unless_constant(primvar: Primvar | None) -> Primvar | None:
+def varying(primvar: Primvar | None) -> Primvar | None:
+    """It, if it differs over the mesh."""
     return None if primvar is not None and primvar.interpolation == "constant" else primvar

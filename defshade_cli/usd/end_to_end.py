@@ -1,0 +1,94 @@
+"""Meshes laid end to end: worked on as one, and taken apart again.
+
+Each NumPy call takes as long as some thousand numbers in it, so that small meshes are worth gathering.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.usd.polygons import Polygons, Primvar, varying
+
+LARGEST = 1 << 12
+"""Corners of a mesh that is small."""
+
+_CORNERS_AT_ONCE = 1 << 18
+
+
+class Row(NamedTuple):
+    """M meshes as one. points, faces, corners: (M + 1,) where each begins, and where the last one ends."""
+
+    polygons: Polygons
+    points: NDArray[np.intp]
+    faces: NDArray[np.intp]
+    corners: NDArray[np.intp]
+
+
+def signature(mesh: Polygons) -> Hashable:
+    """Meshes for which it is the same may stand in one row; what lies on one lies on all."""
+    if not mesh.primvars:
+        return mesh.scheme, mesh.left_handed
+    named = (mesh.normals, mesh.display_color, mesh.display_opacity)
+    lying = tuple([primvar and primvar.interpolation for primvar in named])
+    uvs = tuple([(name, uv.interpolation) for name, uv in mesh.uvs.items()])
+    shown = tuple([(name, each.interpolation, each.values.shape[1:]) for name, each in mesh.shown.items()])
+    return mesh.scheme, mesh.left_handed, lying, uvs, shown
+
+
+def blocks(meshes: Sequence[Polygons]) -> Iterator[Sequence[Polygons]]:
+    """Runs of the meshes, none of much more than _CORNERS_AT_ONCE unless a mesh has."""
+    ends = np.cumsum([len(mesh.indices) for mesh in meshes])
+    firsts = np.searchsorted(ends, np.arange(0, ends[-1], _CORNERS_AT_ONCE), "right")
+    for first, end in pairwise([*np.unique(firsts).tolist(), len(meshes)]):
+        yield meshes[first:end]
+
+
+def lay(meshes: Sequence[Polygons]) -> Row:
+    """One mesh of all, which have one signature, without their holes, and without the colours that all of one has.
+
+    Other constants become values of points.
+    """
+    starts = [[len(array) for array in arrays] for arrays in _arrays(meshes)]
+    points, faces, corners = (np.cumsum([0, *sizes], dtype=np.intp) for sizes in starts)
+    first = meshes[0]
+    whole = Polygons(
+        points=np.concatenate([mesh.points for mesh in meshes]),
+        counts=np.concatenate([mesh.counts for mesh in meshes]),
+        indices=np.concatenate([mesh.indices for mesh in meshes]) + np.repeat(points[:-1], starts[2]),
+        faces=np.concatenate([mesh.faces for mesh in meshes]),
+        scheme=first.scheme,
+        left_handed=first.left_handed,
+        normals=_joined([mesh.normals for mesh in meshes], starts[0]),
+        display_color=_joined([varying(mesh.display_color) for mesh in meshes], starts[0]),
+        display_opacity=_joined([varying(mesh.display_opacity) for mesh in meshes], starts[0]),
+        uvs=_all_joined([mesh.uvs for mesh in meshes], starts[0]),
+        shown=_all_joined([mesh.shown for mesh in meshes], starts[0]),
+    )
+    return Row(whole, points, faces, corners)
+
+
+def _arrays(meshes: Sequence[Polygons]) -> Iterable[list[NDArray[Any]]]:
+    yield [mesh.points for mesh in meshes]
+    yield [mesh.counts for mesh in meshes]
+    yield [mesh.indices for mesh in meshes]
+
+
+def _all_joined(named: Sequence[Mapping[str, Primvar]], points: Sequence[int]) -> Mapping[str, Primvar]:
+    laid = {name: _joined([each[name] for each in named], points) for name in named[0]}
+    return {name: primvar for name, primvar in laid.items() if primvar is not None}
+
+
+def _joined(primvars: Sequence[Primvar | None], points: Sequence[int]) -> Primvar | None:
+    """points: of each mesh."""
+    values = [primvar.values for primvar in primvars if primvar is not None]
+    if not values or primvars[0] is None:
+        return None
+    joined = np.concatenate(values)
+    if primvars[0].interpolation == "constant":
+        return Primvar(np.repeat(joined, points, axis=0), "vertex")
+    return Primvar(joined, primvars[0].interpolation)
