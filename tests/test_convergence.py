@@ -18,7 +18,7 @@ from defshade_cli.passes.batch_means import BATCHES, BatchMeansPass
 from defshade_cli.passes.convergence import FEWEST, TILE, Convergence
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.pipeline import Pipeline
-from defshade_cli.passes.screen import Screen
+from defshade_cli.passes.screen import Screen, regions_of
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.material import Material
 from defshade_cli.settings import MOST_SAMPLES, RenderSettings
@@ -113,8 +113,8 @@ def test_finished_tiles_keep_what_is_known_of_them() -> None:
 
 
 def test_regions_are_runs_of_tiles_within_the_image_joined_over_rows() -> None:
-    tiles = Convergence((4 * TILE, TILE + 8), None)
-    regions = tiles.regions(np.array([[True, True, False, True], [False, False, False, True]]))
+    tiles = np.array([[True, True, False, True], [False, False, False, True]])
+    regions = regions_of(tiles, TILE, (4 * TILE, TILE + 8))
     last = TILE / (TILE + 8)
     np.testing.assert_allclose(regions, [[0, 0, 0.5, last], [0.75, 0, 1, 1]], rtol=1e-6)
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +16,20 @@ from defshade_cli.errors import GpuError, GpuMemoryError
 from defshade_cli.gpu.context import Gpu
 
 _READ_DTYPE = {"f1": np.uint8, "f2": np.float16, "f4": np.float32, "u4": np.uint32}
+
+
+_ROUNDING = 1e-2
+"""Of a pixel, what shares in float32 may be off."""
+
+Part = tuple[float, float, float, float]
+"""Of an image: left, top, right and bottom as shares of it."""
+
+
+def pixels_of(part: Part, size: tuple[int, int]) -> tuple[int, int, int, int]:
+    """(x, y, width, height) of all pixels that a part of an image of (width, height) touches."""
+    left, top, right, bottom = (share * side for share, side in zip(part, size * 2, strict=True))
+    x, y = math.floor(left + _ROUNDING), math.floor(top + _ROUNDING)
+    return x, y, max(math.ceil(right - _ROUNDING) - x, 0), max(math.ceil(bottom - _ROUNDING) - y, 0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +49,19 @@ class Target:
         """(height, width) as stored."""
         assert self.depth is not None
         return _as_image(self.depth, np.float32, 1)[..., 0]
+
+    def keep_to(self, part: Part) -> None:
+        """Draw and clear in a part of the image alone from now on. The framebuffer is bound."""
+        self.framebuffer.scissor = pixels_of(part, self.framebuffer.size)
+
+    @contextmanager
+    def colours_kept(self) -> Iterator[None]:
+        """Draw and clear the depth alone within the block, in which the framebuffer is bound."""
+        framebuffer: Any = self.framebuffer  # moderngl's own types know a mask for one texture
+        framebuffer.color_mask = [(False,) * 4] * len(self.textures)
+        framebuffer.use()
+        yield
+        framebuffer.color_mask = [(True,) * 4] * len(self.textures)
 
     def release(self) -> None:
         """Free the framebuffer and its colour textures; a depth texture may be shared and is its maker's."""

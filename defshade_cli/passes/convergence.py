@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.passes.frame import Size
-from defshade_cli.passes.screen import regions_of
 
 TILE = 32
 """Pixels a side."""
@@ -60,10 +59,6 @@ class Convergence:
         self.error[active] = error[active]
         if self._max_error is not None and samples >= FEWEST:
             self.active = active & (self.error > self._max_error)
-
-    def regions(self, tiles: NDArray[np.bool_]) -> NDArray[np.float32]:
-        """(R, 4) rectangles of some tiles: left, top, right, bottom as shares."""
-        return regions_of(tiles, TILE, self._size)
 
     def sample_count(self) -> NDArray[np.int32]:
         """(height, width, 1) samples that each pixel got."""

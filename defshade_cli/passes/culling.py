@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.targets import Part
 
 _ROUNDING = 1e-5  # what float32 may move a corner, over the greatest coordinate
 
 
-def may_see(clip_from_relative: NDArray[np.float32], corners: NDArray[np.float64]) -> NDArray[np.bool_]:
+def may_see(clip_from_relative: NDArray[np.floating], corners: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(C,) False for boxes (C, 8, 3) that lie wholly beyond a plane of the frustum.
 
     clip_from_relative: (4, 4), transposed as records hold it; depth in [0, 1] either way round. Boxes that are not
@@ -26,6 +27,15 @@ def may_see(clip_from_relative: NDArray[np.float32], corners: NDArray[np.float64
         slack = _ROUNDING * np.abs(clip).max(axis=(1, 2), keepdims=True)
         below, above = xyz < np.array([-1.0, -1.0, 0.0]) * w - slack, xyz > w + slack
     return ~(below.all(axis=1) | above.all(axis=1)).any(axis=1)
+
+
+def clip_of_part(clip_from_relative: NDArray[np.float32], part: Part) -> NDArray[np.floating]:
+    """(4, 4), transposed likewise: what sees a part of the image, which has some width and height."""
+    left, top, right, bottom = part
+    clip = clip_from_relative.astype(np.float64)
+    for axis, low, high in ((0, 2.0 * left - 1.0, 2.0 * right - 1.0), (1, 1.0 - 2.0 * bottom, 1.0 - 2.0 * top)):
+        clip[:, axis] = (clip[:, axis] - 0.5 * (low + high) * clip[:, 3]) * (2.0 / (high - low))
+    return clip
 
 
 class CommandBuffer:

@@ -105,9 +105,9 @@ def middle_of(extent: ShadowExtent, plan: Plan) -> NDArray[np.float64]:
 def shadow_extent(bounds: NDArray[np.float64], plan: Plan) -> ShadowExtent:
     """Casters: the (2, 3) bounds, relative to the eye. Receivers: their part of the box around the view's frustum."""
     rotation, (left, right, bottom, top) = plan.camera.world_from_camera[:3, :3], _filtered_window(plan)
-    scales = plan.clip if plan.camera.projection == "perspective" else (1.0, 1.0)
+    scales = plan.depths if plan.camera.projection == "perspective" else (1.0, 1.0)
     rays = np.array(list(product((left, right), (bottom, top))))
-    frustum = [np.column_stack([rays * s, np.full(4, -z)]) for s, z in zip(scales, plan.clip, strict=True)]
+    frustum = [np.column_stack([rays * s, np.full(4, -z)]) for s, z in zip(scales, plan.depths, strict=True)]
     corners = np.concatenate(frustum) @ rotation.T
     low, high = np.maximum(bounds[0], corners.min(axis=0)), np.minimum(bounds[1], corners.max(axis=0))
     seen = np.stack([low, high]) if (low <= high).all() else bounds

@@ -12,12 +12,13 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import Plane, integer_attachments, uses_standard_depth, write_source
 from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.residence import DrawList
-from defshade_cli.gpu.targets import Target, allocate
+from defshade_cli.gpu.targets import Part, Target, allocate
 from defshade_cli.gpu.textures import textures_source
 from defshade_cli.image.render_space import REC709, RenderSpace
-from defshade_cli.passes.culling import CommandBuffer, may_see
+from defshade_cli.passes.culling import CommandBuffer, clip_of_part, may_see
 from defshade_cli.passes.screen import TileMask
 from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.window import WHOLE_IMAGE
 from defshade_cli.settings import Layout
 
 
@@ -110,21 +111,18 @@ class GBufferPass:
 
         Both sides of every face.
 
-        Under the mask the depth is the background's afterwards, and the planes are undefined unless `whole`.
+        Under the mask the depth is the background's afterwards, and the planes are as they were unless `whole`.
         """
         standard = uses_standard_depth(gbuffer.layout)
         nearest, background = (0.0, 1.0) if standard else (1.0, 0.0)
-        framebuffer = gbuffer.target.framebuffer
-        framebuffer.use()
-        framebuffer.clear(depth=background)
-        for attachment in integer_attachments(gbuffer.planes, gbuffer.layout):
-            self._gpu.clear_integers(attachment)
+        part = WHOLE_IMAGE if whole else mask.open
+        self._clear(gbuffer, background, part)
         if not whole:
-            mask.fill(gbuffer.target, nearest)
-        framebuffer.use()
+            mask.shut(gbuffer.target, nearest)
+        gbuffer.target.framebuffer.use()
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = "<" if standard else ">"
-        self._commands.write(draws.runs(may_see(clip_from_relative, draws.corners)))
+        self._commands.write(draws.runs(may_see(clip_of_part(clip_from_relative, part), draws.corners)))
         for run, program in enumerate(self._programs):
             draws.textures.bind(program)
             self._clip(camera, program)
@@ -133,7 +131,20 @@ class GBufferPass:
             array.release()
         for distance in self._clip_distances:
             self._context.disable_direct(distance)
-        mask.fill(gbuffer.target, background)
+        mask.empty(gbuffer.target, background)
+        gbuffer.target.keep_to(WHOLE_IMAGE)
+
+    def _clear(self, gbuffer: GBuffer, background: float, part: Part) -> None:
+        """All depths and numbers, and the planes of a part of the image, to which draws keep from now on."""
+        target = gbuffer.target
+        if part != WHOLE_IMAGE:
+            with target.colours_kept():
+                target.framebuffer.clear(depth=background)
+        target.framebuffer.use()
+        for attachment in integer_attachments(gbuffer.planes, gbuffer.layout):
+            self._gpu.clear_integers(attachment)
+        target.keep_to(part)
+        target.framebuffer.clear(depth=background)
 
     def _clip(self, camera: Camera, program: moderngl.Program) -> None:
         """By the camera's clipping planes, in relative space. Shadows are cast by what they cut off, as in Storm."""

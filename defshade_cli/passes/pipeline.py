@@ -14,6 +14,7 @@ from defshade_cli.gpu.planes import MOST_TARGETS, Plane
 from defshade_cli.gpu.residence import LIGHTS, MOTIONS, VIEW, DrawList, GpuScene, RecordBuffer
 from defshade_cli.image.film import Film, Sampling
 from defshade_cli.passes.accumulation import AccumulationPass
+from defshade_cli.passes.changed_tiles import beside, changed_tiles
 from defshade_cli.passes.debug_volumes import DebugVolumesPass, laid_over
 from defshade_cli.passes.emission import EmissionPass
 from defshade_cli.passes.emitters import LitSample, light_batches, middle_of, shadow_extent
@@ -21,6 +22,7 @@ from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
 from defshade_cli.passes.identification import Manifests, Mattes, id_manifests
+from defshade_cli.passes.light_lists import TILE
 from defshade_cli.passes.light_records import light_records
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.light_tiles import LightTiles
@@ -31,7 +33,7 @@ from defshade_cli.passes.lobe_rays import LampRaysPass, LampStore, LobeRays, Sky
 from defshade_cli.passes.motion import motion_records, neighbouring_points
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
-from defshade_cli.passes.screen import WHOLE, Screen, TileMask
+from defshade_cli.passes.screen import Narrowing, Screen, TileMask
 from defshade_cli.passes.shadow_atlas import ShadowAtlas
 from defshade_cli.passes.shadows import ShadowPass, ShadowVariant
 from defshade_cli.passes.sharp_tiles import SharpTilesPass
@@ -71,6 +73,7 @@ class Pipeline:
         self._lights = RecordBuffer(gpu, LIGHTS)
         self._motions = RecordBuffer(gpu, MOTIONS)
         self._screen, self._sharp, self._mask = Screen(gpu), Screen(gpu), TileMask(gpu)
+        self._narrowing = Narrowing(self._screen, self._mask)
         self._skies, self._trees, self._lamps = SkyTextures(gpu), TreeStore(gpu), LampStore(gpu)
         self._gbuffer_pass = cache(lambda variant: GBufferPass(gpu, variant))
         self._emission_pass = cache(lambda variant: EmissionPass(gpu, variant, self._screen))
@@ -88,7 +91,7 @@ class Pipeline:
         self._tables = TableStore(gpu)
         self._accumulation = AccumulationPass(gpu, self._frame, self._screen)
         self._debug_volumes_pass = cache(lambda: DebugVolumesPass(gpu))
-        self._stopping = Stopping(gpu, self._frame, self._screen, self._mask)
+        self._stopping = Stopping(gpu, self._frame, self._screen, self._narrowing)
 
     @property
     def largest_side(self) -> int:
@@ -108,14 +111,22 @@ class Pipeline:
         plan: Plan,
         moments: Iterator[ShutterSample] | None = None,
         uploaded: DrawList | None = None,
+        before: Film | None = None,
     ) -> Film:
         """The plan's layers. Raises GpuError, GpuMemoryError where memory ends.
 
         moments: what samples see in turn, where the plan has motion blur; data layers show the scene itself.
         uploaded: of this scene, where that has been done before.
+        before: the film of the frame that the plan's `redrawing` is about.
         """
-        with self._gpu.watched():
-            return self._film(scene, plan, moments, uploaded)
+        tiles = changed_tiles(plan) if before else None
+        with self._gpu.watched(), self._narrowing.of(tiles, TILE, plan.size):
+            film = self._film(scene, plan, moments, uploaded)
+        if before and tiles is not None:
+            layers = beside(before.layers, film.layers, tiles)
+            data = {name: layers[name] for name in plan.data_layers}
+            film = replace(film, layers=layers, manifests=film.manifests | id_manifests(data, scene))
+        return film
 
     def _film(
         self, scene: Scene, plan: Plan, moments: Iterator[ShutterSample] | None, uploaded: DrawList | None
@@ -259,13 +270,11 @@ class Pipeline:
         """Where in its domes' skies the image looks for light, if samples are drawn there."""
         if not (plan.lit and any(dome.points for dome in plan.domes)):
             return NO_GUIDES
-        self._mask.hide(WHOLE[:0])
         small = scout(plan)
         return sky_guides(self._drawn_planes(draws, plan.planes, small, self._scouted), small)
 
     def _volumes(self, draws: DrawList, plan: Plan, tables: LightTables, gbuffer: GBuffer) -> NDArray[np.float32]:
         """The light volumes as the pixels' centres see them, domes apart."""
-        self._mask.hide(WHOLE[:0])
         self._draw_gbuffer(draws, plan, gbuffer, CENTRE)
         lights = [planned for planned in plan.lights if planned not in plan.domes]
         emitters = [far_field(planned.light) for planned in lights]

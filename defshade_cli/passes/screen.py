@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 
 import moderngl
@@ -9,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.targets import Target
+from defshade_cli.gpu.targets import Part, Target
 
 WHOLE = np.array([[0.0, 0.0, 1.0, 1.0]], np.float32)
 """The one region that is all of the image: left, top, right, bottom as shares of it."""
@@ -56,29 +58,78 @@ class Screen:
 
 
 class TileMask:
-    """Keeps passes away from tiles that are done: a depth there that fragments fail before they are shaded."""
+    """Keeps passes away from tiles that are done: a depth there that fragments fail before they are shaded.
+
+    Around the others a pixel is drawn too, for passes that read what lies beside theirs.
+    open: a part around what is drawn; the whole image where all is done.
+    """
+
+    open: Part
 
     def __init__(self, gpu: Gpu) -> None:
         self._context, self._shaders = gpu.context, gpu.shaders
-        self._finished = Screen(gpu)
-        self.hide(WHOLE[:0])
+        self._done, self._apart = Screen(gpu), Screen(gpu)
+        self.hide(WHOLE[:0], WHOLE, (1, 1))
 
     @cached_property
-    def _array(self) -> moderngl.VertexArray:
+    def _arrays(self) -> dict[Screen, moderngl.VertexArray]:
         """Compiled where the first tile is done."""
-        return self._finished.array(self._shaders.program("screen.vert", "depth.frag"))
+        program = self._shaders.program("screen.vert", "depth.frag")
+        return {screen: screen.array(program) for screen in (self._done, self._apart)}
 
-    def hide(self, regions: NDArray[np.float32]) -> None:
-        """The (R, 4) regions that are done."""
-        self._finished.cover(regions)
-        self.is_empty = not len(regions)
+    def hide(self, done: NDArray[np.float32], rest: NDArray[np.float32], size: tuple[int, int]) -> None:
+        """The (R, 4) regions that are done, and those that are not, of an image of (width, height)."""
+        inwards = np.array([1.0, 1.0, -1.0, -1.0]) / np.array(size * 2)
+        self._done.cover(done)
+        self._apart.cover(done + inwards)
+        self.is_empty = not len(done)
+        around = (rest if len(rest) else WHOLE) - inwards
+        (left, top), (right, bottom) = around[:, :2].min(axis=0), around[:, 2:].max(axis=0)
+        self.open = (max(left, 0.0), max(top, 0.0), min(right, 1.0), min(bottom, 1.0))
 
-    def fill(self, target: Target, depth: float) -> None:
-        """Write one depth there; what the colours hold there is undefined afterwards."""
+    def shut(self, target: Target, depth: float) -> None:
+        """Write a depth where nothing is to be drawn, and no colours."""
+        self._fill(self._apart, target, depth)
+
+    def empty(self, target: Target, depth: float) -> None:
+        """Write a depth in all that is done, and no colours."""
+        self._fill(self._done, target, depth)
+
+    def _fill(self, screen: Screen, target: Target, depth: float) -> None:
         if self.is_empty:
             return
-        target.framebuffer.use()
-        self._context.enable_only(moderngl.DEPTH_TEST)
-        self._context.depth_func = "1"
-        self._array.program["screen_depth"] = depth
-        self._finished.draw(self._array)
+        array = self._arrays[screen]
+        with target.colours_kept():
+            self._context.enable_only(moderngl.DEPTH_TEST)
+            self._context.depth_func = "1"
+            array.program["screen_depth"] = depth
+            screen.draw(array)
+
+
+class Narrowing:
+    """What passes keep to: the regions of a screen, and around them a mask."""
+
+    def __init__(self, screen: Screen, mask: TileMask) -> None:
+        self._screen, self._mask = screen, mask
+
+    def to(self, tiles: NDArray[np.bool_], side: int, size: tuple[int, int]) -> None:
+        """Some tiles (R, C) of `side` pixels of an image of (width, height)."""
+        rest = regions_of(tiles, side, size)
+        self._screen.cover(rest)
+        self._mask.hide(regions_of(~tiles, side, size), rest, size)
+
+    def end(self) -> None:
+        """All of the image from now on."""
+        self._screen.cover(WHOLE)
+        self._mask.hide(WHOLE[:0], WHOLE, (1, 1))
+
+    @contextmanager
+    def of(self, tiles: NDArray[np.bool_] | None, side: int, size: tuple[int, int]) -> Iterator[None]:
+        """Some tiles (R, C) within the block; all of the image after it, and where none are given."""
+        self.end()
+        if tiles is not None:
+            self.to(tiles, side, size)
+        try:
+            yield
+        finally:
+            self.end()

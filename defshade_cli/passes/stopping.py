@@ -13,17 +13,17 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.film import Sampling, StopReason
 from defshade_cli.passes.accumulation import AccumulationPass
 from defshade_cli.passes.batch_means import BatchMeansPass
-from defshade_cli.passes.convergence import FEWEST, Convergence
+from defshade_cli.passes.convergence import FEWEST, TILE, Convergence
 from defshade_cli.passes.frame import Frame
-from defshade_cli.passes.screen import WHOLE, Screen, TileMask
+from defshade_cli.passes.screen import Narrowing, Screen
 from defshade_cli.plan import Plan
 
 
 class Stopping:
-    """Asked after each sample; narrows `screen` and `mask` to the tiles that need more, and ends where none does."""
+    """Asked after each sample; narrows passes to the tiles that need more, and ends where none does."""
 
-    def __init__(self, gpu: Gpu, frame: Frame, screen: Screen, mask: TileMask) -> None:
-        self._gpu, self._frame, self._screen, self._mask = gpu, frame, screen, mask
+    def __init__(self, gpu: Gpu, frame: Frame, screen: Screen, narrowing: Narrowing) -> None:
+        self._gpu, self._frame, self._screen, self._narrowing = gpu, frame, screen, narrowing
 
     @cached_property
     def _batches(self) -> BatchMeansPass:
@@ -44,7 +44,7 @@ class Stopping:
             self._batches.note(accumulation)
             if self._plan.max_error is not None and self._batches.are_complete and accumulation.count >= FEWEST:
                 self._judge(accumulation.count)
-                self._narrow()
+                self._narrowing.to(self._convergence.active, TILE, self._plan.size)
         if self._convergence.has_arrived:
             self._stopped_by = "max-error"
         elif self._is_late():
@@ -52,16 +52,12 @@ class Stopping:
         return self._stopped_by != "samples"
 
     def finish(self, samples: int) -> tuple[Sampling, NDArray[np.int32], NDArray[np.float32]]:
-        """What came of it, samples of each pixel, and the variance of its mean luminance, (height, width, 1) each.
-
-        Full screen again.
-        """
+        """What came of it, samples of each pixel, and the variance of its mean luminance, (height, width, 1) each."""
         if self._plan.tracks_error:
             self._judge(samples)
+            self._narrowing.end()
         else:
             self._convergence.samples[:] = samples
-        self._screen.cover(WHOLE)
-        self._mask.hide(WHOLE[:0])
         counts = self._convergence.sample_count()
         error = self._convergence.estimate
         known = error if math.isfinite(error) else None
@@ -71,11 +67,6 @@ class Stopping:
     def _judge(self, samples: int) -> None:
         luminance, self._variance = self._batches.read()
         self._convergence.judge(luminance, self._variance, samples)
-
-    def _narrow(self) -> None:
-        active = self._convergence.active
-        self._screen.cover(self._convergence.regions(active))
-        self._mask.hide(self._convergence.regions(~active))
 
     def _is_late(self) -> bool:
         if self._plan.time_limit is None:

@@ -2,6 +2,16 @@
 
 from defshade_cli.plan.decisions import Decision
 from defshade_cli.plan.lights import PlannedLight, Volume, volume_of
-from defshade_cli.plan.plan import Plan, ShutterSample, make_plan, plan_moments
+from defshade_cli.plan.plan import Plan, ShutterSample, make_plan, plan_after, plan_moments
 
-__all__ = ["Decision", "Plan", "PlannedLight", "ShutterSample", "Volume", "make_plan", "plan_moments", "volume_of"]
+__all__ = [
+    "Decision",
+    "Plan",
+    "PlannedLight",
+    "ShutterSample",
+    "Volume",
+    "make_plan",
+    "plan_after",
+    "plan_moments",
+    "volume_of",
+]

@@ -63,6 +63,7 @@ def explain(plan: Plan) -> Iterator[Decision]:
     yield _kept("error estimate", plan.tracks_error, "as asked", "nothing needs it")
     if not plan.lit:
         yield Decision("lighting", "skipped", "no layer needs it")
+    yield _explain_redrawing(plan)
 
 
 def _explain_shadows(plan: Plan) -> Decision:
@@ -95,6 +96,13 @@ def _explain_motion(plan: Plan) -> Decision:
         return Decision("motion blur", "skipped", "one sample, a still stage, a closed shutter, or not asked")
     opens, closes = plan.camera.shutter
     return Decision("motion blur", f"{plan.moments} moments", f"the shutter is open from {opens:g} to {closes:g}")
+
+
+def _explain_redrawing(plan: Plan) -> Decision:
+    redrawing = plan.redrawing
+    if redrawing.boxes is None:
+        return Decision("redrawing", "all", redrawing.reason)
+    return Decision("redrawing", "a part", f"all but {redrawing.moved} instances is as in the frame before")
 
 
 def _kept(subject: str, kept: bool, why: str, why_not: str) -> Decision:

@@ -75,12 +75,12 @@ def plan_lights(
     gain = exposure * response * max(len(lit), 1) / settings.light_tolerance
     order: dict[str, int] = {"quad": 0, "sphere": 1, "cone": 2}
     groups = group_lights([light for _, light in lit], light_groups(layers), light_outputs(layers))
-    points = share_points([apparent_size(light, scene.bounds) for _, light in lit], settings)
+    points = share_points([apparent_size(light, scene.roomy_bounds) for _, light in lit], settings)
     planned = [
         PlannedLight(
             light=light,
             volume=volume_of(light),
-            reach=_reach(light, scene.bounds, gain),
+            reach=_reach(light, scene.roomy_bounds, gain),
             number=number,
             is_empty=_is_empty(light, scene),
             groups=of_light,

@@ -57,7 +57,7 @@ def roughest_rays(lights: Iterable[PlannedLight], scene: Scene) -> float:
     seen = [planned.light for planned in lights if planned.by_rays]
     if any(isinstance(light, DomeLight) for light in seen):
         return ROUGHEST
-    largest = max((apparent_size(light, scene.bounds) for light in seen), default=0.0)
+    largest = max((apparent_size(light, scene.roomy_bounds) for light in seen), default=0.0)
     return min(math.sqrt(2.0 * largest / NARROW), ROUGHEST)
 
 
@@ -73,7 +73,7 @@ def _lamps(lights: Iterable[PlannedLight], scene: Scene, settings: RenderSetting
         planned
         for planned in lights
         if planned.points * settings.most_samples > 1
-        and apparent_size(planned.light, scene.bounds) >= least
+        and apparent_size(planned.light, scene.roomy_bounds) >= least
         and lamp_of(planned.light, np.zeros(3)) is not None
         and _is_plainly_hidden(planned.light, scene, settings, few)
     ]
@@ -101,5 +101,5 @@ def _brightness(light: Light, scene: Scene) -> float:
     strength = float(light.emission @ LUMINANCE) * light.power_scale
     if isinstance(light, DistantLight):
         return strength
-    apart = scene.bounds.mean(axis=0) - light.position
+    apart = scene.roomy_bounds.mean(axis=0) - light.position
     return strength / max(float(apart @ apart), light.spread**2)

@@ -22,6 +22,7 @@ from defshade_cli.plan.lobe_rays import roughest_rays, seen_by_rays
 from defshade_cli.plan.moments import count_moments, share_moments
 from defshade_cli.plan.opacity import is_transparent, thin_materials, thin_numbers
 from defshade_cli.plan.points import pixel_share, rays_a_sample
+from defshade_cli.plan.redrawing import WHOLE, Redrawing, find_redrawing
 from defshade_cli.plan.shadow_maps import count_maps, shadow_resolution
 from defshade_cli.plan.solidity import solid_materials
 from defshade_cli.plan.texels import seen_texels
@@ -47,7 +48,8 @@ class Plan:
 
     display, display_camera: the whole image, and the camera conformed to it.
     window: the part of it that is rendered; size and camera are its own.
-    clip: (near, far), the camera's range tightened to the geometry.
+    depths: (near, far), the camera's range tightened to the geometry.
+    clip: the same with some room, so that it stays from frame to frame.
     render_space: of light and reflectance.
     exposure: linear, the camera's and the settings' together.
     samples: a pixel at most.  pixel_share: see plan/points.py.  max_error, time_limit: of RenderSettings.
@@ -67,12 +69,14 @@ class Plan:
     levels: how often subdivision surfaces were refined, ascending; empty without any.
     ranks: (id, coverage) pairs of a Cryptomatte.
     debug: of RenderSettings.
+    redrawing: what the frame before leaves to draw.
     """
 
     display: tuple[int, int]
     display_camera: Camera
     window: DataWindow
     camera: Camera
+    depths: tuple[float, float]
     clip: tuple[float, float]
     render_space: RenderSpace
     exposure: float
@@ -105,6 +109,7 @@ class Plan:
     levels: tuple[int, ...]
     ranks: int
     debug: Debug | None = None
+    redrawing: Redrawing = WHOLE
 
     @property
     def size(self) -> tuple[int, int]:
@@ -263,7 +268,8 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         display_camera=display_camera,
         window=window,
         camera=camera,
-        clip=_tight_clip(camera, scene.bounds),
+        depths=_tight_clip(camera, scene.bounds),
+        clip=_tight_clip(camera, scene.roomy_bounds),
         render_space=find_render_space(settings.render_space or scene.rendering_space, settings.ocio),
         exposure=exposure,
         layout=settings.layout,
@@ -296,6 +302,11 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         portals=len(scene.portals),
         levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None})),
     )
+
+
+def plan_after(before: Scene, planned: Plan, scene: Scene, plan: Plan) -> Plan:
+    """The plan of `scene`, where the frame before was planned too and is kept."""
+    return replace(plan, redrawing=find_redrawing(before, planned, scene, plan))
 
 
 ShutterSample = tuple[Scene, Plan]

@@ -7,6 +7,7 @@ from collections.abc import Generator, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from defshade_cli.farm.targets import FINGERPRINT, check_outputs, is_done, remov
 from defshade_cli.image.files import write
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import BEAUTY
-from defshade_cli.plan import Plan, ShutterSample, make_plan, plan_moments
+from defshade_cli.plan import Plan, ShutterSample, make_plan, plan_after, plan_moments
 from defshade_cli.rendering import tiles
 from defshade_cli.rendering.pictures import shown
 from defshade_cli.rendering.renderer import Renderer
@@ -176,9 +177,8 @@ def _draw(shot: Shot, opened: OpenJob, renderer: Renderer, command: str, stills:
         scene = reader.read(shot.frame)
     picture = stills.find(shot, scene)
     if picture is None:
-        picture = _picture(shot, scene, reader, renderer, seconds)
-        if reader.is_still:
-            stills.keep(shot, scene, picture)
+        picture = _picture(shot, scene, reader, renderer, seconds, stills.last(shot))
+        stills.keep(shot, scene, picture)
     film, plan = replace(picture.film, frame=shot.frame), picture.plan
     facts = _provenance(shot, scene, command) | film.metadata | _cost(plan, seconds.get("draw", 0.0))
     if not picture.fault:
@@ -187,20 +187,31 @@ def _draw(shot: Shot, opened: OpenJob, renderer: Renderer, command: str, stills:
     return _Drawn(shot, replace(film, metadata=facts), plan, seconds, fault)
 
 
-def _picture(shot: Shot, scene: Scene, reader: StageReader, renderer: Renderer, seconds: dict[str, float]) -> Picture:
+def _picture(
+    shot: Shot,
+    scene: Scene,
+    reader: StageReader,
+    renderer: Renderer,
+    seconds: dict[str, float],
+    last: tuple[Scene, Picture] | None,
+) -> Picture:
+    """last: scene and picture of the frame before."""
     job = shot.job
     with _timed(seconds, "plan"):
         plan = make_plan(scene, job.settings)
+        if last:
+            plan = plan_after(last[0], last[1].plan, scene, plan)
     with _timed(seconds, "context"):
         pipeline = renderer.pipeline(job.device)
     with _timed(seconds, "upload"):
         uploaded = pipeline.upload(scene, plan)
     with _timed(seconds, "draw"):
-        film = tiles.render(pipeline, scene, plan, lambda: _moments(scene, plan, reader, job.settings), uploaded)
+        moments = partial(_moments, scene, plan, reader, job.settings)
+        film = tiles.render(pipeline, scene, plan, moments, uploaded, last[1].drawn if last else None)
     with _timed(seconds, "check"):
         checked = sound(film, scene, job.settings, pipeline, job.output.on_nan)
     with _timed(seconds, "show"):
-        return Picture(shown(checked.film, shot, renderer), plan, checked.fault)
+        return Picture(shown(checked.film, shot, renderer), film, plan, checked.fault)
 
 
 def _moments(scene: Scene, plan: Plan, reader: StageReader, settings: RenderSettings) -> Iterator[ShutterSample]:

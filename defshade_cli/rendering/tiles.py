@@ -24,15 +24,18 @@ _SMALLEST = 64
 Moments = Callable[[], Iterator[ShutterSample]]
 
 
-def render(pipeline: Pipeline, scene: Scene, plan: Plan, moments: Moments, uploaded: DrawList) -> Film:
+def render(
+    pipeline: Pipeline, scene: Scene, plan: Plan, moments: Moments, uploaded: DrawList, before: Film | None = None
+) -> Film:
     """The plan's film, in tiles where it is larger than LARGEST, and in smaller ones where memory ends.
 
-    moments: begins the shutter's anew. Raises GpuError, GpuMemoryError where the smallest tile does not fit.
+    moments: begins the shutter's anew.  before: as Pipeline.render has it; what is drawn in tiles is drawn whole.
+    Raises GpuError, GpuMemoryError where the smallest tile does not fit.
     """
     side = min(LARGEST, pipeline.largest_side)
     while True:
         try:
-            return _in_tiles(pipeline, scene, plan, moments, uploaded, side)
+            return _in_tiles(pipeline, scene, plan, moments, uploaded, side, before)
         except GpuMemoryError as error:
             side = min(side, max(plan.size)) // 2
             if side < _SMALLEST:
@@ -40,10 +43,18 @@ def render(pipeline: Pipeline, scene: Scene, plan: Plan, moments: Moments, uploa
             log.warning("%s; the image is drawn in tiles of %d pixels", error, side)
 
 
-def _in_tiles(pipeline: Pipeline, scene: Scene, plan: Plan, moments: Moments, uploaded: DrawList, side: int) -> Film:
+def _in_tiles(
+    pipeline: Pipeline,
+    scene: Scene,
+    plan: Plan,
+    moments: Moments,
+    uploaded: DrawList,
+    side: int,
+    before: Film | None,
+) -> Film:
     windows = plan.window.tiles(side)
     if len(windows) == 1:
-        return pipeline.render(scene, plan, moments(), uploaded)
+        return pipeline.render(scene, plan, moments(), uploaded, before)
     log.info("drawn in %d tiles", len(windows))
     films = []
     for window in windows:

@@ -18,6 +18,9 @@ from defshade_cli.scene.texture import Texture
 from defshade_cli.scene.window import WHOLE_IMAGE
 from defshade_cli.spaces import ConformPolicy
 
+_GRID_BITS = 6
+"""Steps of `roomy_bounds`: between a 64th and a 128th of the longest side."""
+
 
 @dataclass(frozen=True, slots=True)
 class Unsupported:
@@ -73,6 +76,15 @@ class Scene:
     def bounds(self) -> NDArray[np.float64]:
         """(2, 3) world-space box around every drawable; (+inf, −inf) for a scene without geometry."""
         return enclose([self.drawable_bounds])
+
+    @cached_property
+    def roomy_bounds(self) -> NDArray[np.float64]:
+        """(2, 3) around `bounds`, on a coarse grid: what is fitted to it stays while things move a little."""
+        extent = float(np.ptp(self.bounds, axis=0).max())
+        if not (np.isfinite(extent) and extent > 0.0):
+            return self.bounds
+        step = 2.0 ** (np.floor(np.log2(extent)) - _GRID_BITS)
+        return np.stack([np.floor(self.bounds[0] / step), np.ceil(self.bounds[1] / step)]) * step
 
     @cached_property
     def drawable_bounds(self) -> NDArray[np.float64]:

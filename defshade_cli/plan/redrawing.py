@@ -1,0 +1,130 @@
+"""What of a frame must be drawn anew, where the one before is known: what moved covers a part of the image.
+
+Instances are compared all at once, by what the passes read of them; whatever else differs shows in all of the image, or
+might, and then all of it is drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.scene.geometry import Drawable, world_boxes
+from defshade_cli.scene.light import CylinderLight
+from defshade_cli.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from defshade_cli.plan.plan import Plan
+
+_BY_INSTANCE = ("world_from_object", "instance_ids", "display_color", "display_opacity", "link_sets")
+_OF_THE_SCENE = ("materials", "lights", "labels", "lit_by")
+_APART = frozenset(("camera", "display_camera", "lights", "redrawing", "levels", "depths", "time_limit"))
+"""Fields of a plan that are compared otherwise, or that no pixel depends on."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Redrawing:
+    """reason: why all of the image is drawn; empty where only a part is.
+
+    boxes: (N, 2, 3) world space, around what changed as it was and as it is.  moved: instances that changed.
+    """
+
+    reason: str = ""
+    boxes: NDArray[np.float64] | None = None
+    moved: int = 0
+
+
+WHOLE = Redrawing("no frame before it is known")
+
+
+def find_redrawing(before: Scene, planned: Plan, scene: Scene, plan: Plan) -> Redrawing:
+    """Of `scene` after `before`, each with its plan."""
+    reason = next(_reasons(before, planned, scene, plan), "")
+    changed = None if reason else _changed_rows(before, scene)
+    if changed is None:
+        return Redrawing(reason or "other things are drawn")
+    boxes = np.concatenate([_boxes(one, changed) for one in (before, scene)])
+    return Redrawing("", boxes, len(changed)) if np.isfinite(boxes).all() else Redrawing("what moves is not finite")
+
+
+def _reasons(before: Scene, planned: Plan, scene: Scene, plan: Plan) -> Iterator[str]:
+    """Why all of the image may look otherwise, as far as there are reasons."""
+    if not (_are_equal(before.camera, scene.camera) and _are_equal(planned.camera, plan.camera)):
+        yield "the camera moves"
+    if any(not _same(getattr(before, name), getattr(scene, name)) for name in _OF_THE_SCENE):
+        yield "lights or materials change"
+    if _light_terms(planned) != _light_terms(plan):
+        yield "lights reach otherwise"
+    kept = (f.name for f in fields(plan) if f.name not in _APART)
+    if any(not _same(getattr(planned, name), getattr(plan, name)) for name in kept):
+        yield "it is planned otherwise"
+    fitted = plan.shadows or any(isinstance(planned.light, CylinderLight) for planned in plan.lights)
+    if fitted and not (_are_same_bounds(before, scene) and planned.depths == plan.depths):
+        yield "lights are fitted to other bounds"
+    if plan.shadows:
+        yield "shadows fall anywhere"
+    if plan.moments or "MOTION" in plan.inputs:
+        yield "what moves is seen at more than one time"
+    if any(dome.points for dome in plan.domes):
+        yield "a dome is sampled by what the image shows"
+    if plan.tracks_error or plan.time_limit is not None or plan.debug or plan.mattes:
+        yield "layers or limits concern all of it"
+
+
+def _are_same_bounds(before: Scene, scene: Scene) -> bool:
+    return np.array_equal(before.bounds, scene.bounds)
+
+
+def _light_terms(plan: Plan) -> list[tuple[Any, ...]]:
+    """What plan/lights.py has chosen for each."""
+    return [(p.number, p.volume, p.reach, p.is_empty, p.groups, p.points, p.by_rays) for p in plan.lights]
+
+
+def _changed_rows(before: Scene, scene: Scene) -> NDArray[np.int64] | None:
+    """Which instances, counted through all drawables, look otherwise; None where they are others."""
+    pairs = list(zip(before.drawables, scene.drawables, strict=False))
+    if len(before.drawables) != len(scene.drawables) or len(before.meshes) != len(scene.meshes):
+        return None
+    if not all(_are_named_alike(old, new) for old, new in pairs):
+        return None
+    others = np.array([old is not new for old, new in zip(before.meshes, scene.meshes, strict=True)], bool)
+    changed = others[_mesh_numbers(scene)]
+    for name in _BY_INSTANCE if pairs else ():
+        old, new = (np.concatenate([getattr(d, name) for d in s.drawables]) for s in (before, scene))
+        changed = changed | (old != new).reshape(len(changed), -1).any(axis=1)
+    return np.flatnonzero(changed)
+
+
+def _are_named_alike(old: Drawable, new: Drawable) -> bool:
+    counts = len(old.world_from_object) == len(new.world_from_object)
+    return counts and (old.mesh, old.subsets, old.paths) == (new.mesh, new.subsets, new.paths)
+
+
+def _mesh_numbers(scene: Scene) -> NDArray[np.int64]:
+    """(I,) of all instances."""
+    counts = [len(drawable.world_from_object) for drawable in scene.drawables]
+    return np.repeat(np.array([drawable.mesh for drawable in scene.drawables], np.int64), counts)
+
+
+def _boxes(scene: Scene, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(N, 2, 3) world space, of some instances."""
+    if not len(rows):
+        return np.empty((0, 2, 3))
+    bounds = np.array([mesh.bounds for mesh in scene.meshes])[_mesh_numbers(scene)[rows]]
+    return world_boxes(bounds, np.concatenate([d.world_from_object for d in scene.drawables])[rows])
+
+
+def _same(old: Any, new: Any) -> bool:
+    """Equal; of sequences of things that have no equality, the very same things."""
+    if isinstance(old, Sequence) and not isinstance(old, str):
+        return len(old) == len(new) and all(a is b or a == b for a, b in zip(old, new, strict=True))
+    return bool(old is new or old == new)
+
+
+def _are_equal(old: Any, new: Any) -> bool:
+    """Do two records hold equal values, arrays among them?"""
+    return all(np.array_equal(getattr(old, f.name), getattr(new, f.name)) for f in fields(old))
