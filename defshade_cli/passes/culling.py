@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import moderngl
@@ -13,6 +14,9 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.targets import Part
 
 _ROUNDING = 1e-5  # what float32 may move a corner, over the greatest coordinate
+
+_MOST_QUEUED = 2**16
+"""Triangles, about, that a software rasteriser sets up before it draws them, some 350 bytes each."""
 
 
 def may_see(clip_from_relative: NDArray[np.floating], corners: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -42,18 +46,30 @@ class CommandBuffer:
     """Indirect commands, written anew for every view, in runs that different programs draw."""
 
     def __init__(self, gpu: Gpu) -> None:
-        self._buffer = gpu.keep(gpu.context.buffer(reserve=256))
-        self._ends = np.zeros(1, np.int64)
+        self._gpu, self._buffer = gpu, gpu.keep(gpu.context.buffer(reserve=256))
+        self._ends = self._breaks = np.zeros(1, np.int64)
 
     def write(self, runs: Sequence[NDArray[Any]]) -> None:
         """Upload runs of draw commands, (N,) records each, one behind the other."""
-        data = np.concatenate(runs).tobytes()
+        commands = np.concatenate(runs)
+        data = commands.tobytes()
         self._ends = np.cumsum([0, *map(len, runs)])
+        self._breaks = _breaks(commands) if self._gpu.is_software else np.empty(0, np.int64)
         self._buffer.orphan(max(len(data), self._buffer.size))
         self._buffer.write(data)
 
     def render(self, array: moderngl.VertexArray, run: int) -> None:
         """Draw a run of those that were written."""
         first, end = (int(place) for place in self._ends[run : run + 2])
-        if end > first:
-            array.render_indirect(self._buffer, count=end - first, first=first)
+        breaks = self._breaks[(self._breaks >= first) & (self._breaks < end)].tolist()
+        for start, stop in pairwise([first, *breaks, end]):
+            if start in breaks:
+                self._gpu.context.finish()
+            if stop > start:
+                array.render_indirect(self._buffer, count=stop - start, first=start)
+
+
+def _breaks(commands: NDArray[Any]) -> NDArray[np.int64]:
+    """Before which of the (N,) commands what came before is drawn to its end."""
+    triangles = np.cumsum(commands["count"].astype(np.int64) // 3 * commands["instances"])
+    return np.flatnonzero(np.diff(triangles // _MOST_QUEUED)) + 1

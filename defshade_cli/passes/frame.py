@@ -36,6 +36,11 @@ class Frame:
             self._gbuffers[planes, layout] = make_gbuffer(self._gpu, size, planes, layout)
         return self._gbuffers[planes, layout]
 
+    def spare(self, gbuffer: GBuffer) -> None:
+        """Free its planes: nothing reads them any more. Whatever is drawn next has all targets made anew."""
+        gbuffer.target.release()
+        self._size = (0, 0)
+
     def radiance(self, name: str, size: Size, gbuffer: GBuffer | None = None, components: int = 4) -> Target:
         """A float target with one texture "radiance"; it tests against the depth of `gbuffer` where given.
 

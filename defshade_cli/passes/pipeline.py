@@ -62,10 +62,13 @@ class _Canvas:
 
 
 class Pipeline:
-    """Renders one frame after another on a Gpu, keeping what they share: buffers, targets, compiled passes."""
+    """Renders one frame after another on a Gpu, keeping what they share: buffers, targets, compiled passes.
 
-    def __init__(self, gpu: Gpu) -> None:
-        self._gpu = gpu
+    lone: there will be one, whose GBuffer is freed before the image is read back.
+    """
+
+    def __init__(self, gpu: Gpu, *, lone: bool = False) -> None:
+        self._gpu, self._lone = gpu, lone
         gpu.make_current()
         self._scene = GpuScene(gpu)
         self._frame, self._scouted = Frame(gpu), Frame(gpu)
@@ -203,6 +206,9 @@ class Pipeline:
         sampling, counts, variance = self._stopping.finish(self._accumulation.count)
         if canvas.rays:
             canvas.rays.release()
+        if self._lone and not (plan.data_layers or plan.debug):
+            self._frame.spare(gbuffer)
+            self._mask.let_go_of_textures(radiance)
         beauty = self._accumulation.mean(counts)
         if plan.debug == "volumes":
             beauty = laid_over(beauty, self._volumes(draws, plan, tables, gbuffer))

@@ -95,6 +95,14 @@ class TileMask:
         """Write a depth in all that is done, and no colours."""
         self._fill(self._done, target, depth)
 
+    def let_go_of_textures(self, target: Target) -> None:
+        """Draw nothing, twice: llvmpipe holds the textures of a draw, deleted or not, until the second one after it."""
+        self.hide(np.zeros_like(WHOLE), WHOLE, (1, 1))
+        for _ in range(2):
+            self.empty(target, 0.0)
+            self._context.finish()
+        self.hide(WHOLE[:0], WHOLE, (1, 1))
+
     def _fill(self, screen: Screen, target: Target, depth: float) -> None:
         if self.is_empty:
             return

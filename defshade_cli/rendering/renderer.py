@@ -21,9 +21,11 @@ class Renderer:
     """The Pipelines of the devices that jobs name, each made when a frame first needs it; a context manager.
 
     One renderer serves one job after another. Closed, it can be used again.
+    lone: a single image will be drawn.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, lone: bool = False) -> None:
+        self._lone = lone
         self._stack = ExitStack()
         self._gpus: dict[int | None, Gpu] = {}
         self._pipelines: dict[int | None, Pipeline] = {}
@@ -41,7 +43,7 @@ class Renderer:
         """Raises GpuError."""
         if device not in self._pipelines:
             self._gpus[device] = self._stack.enter_context(Gpu(device))
-            self._pipelines[device] = Pipeline(self._gpus[device])
+            self._pipelines[device] = Pipeline(self._gpus[device], lone=self._lone)
         return self._pipelines[device]
 
     def display(self, device: int | None, transform: DisplayTransform) -> DisplayPass | None:

@@ -78,7 +78,7 @@ def run(job: RenderJob, *, command: str = "", renderer: Renderer | None = None) 
     everything = [shot for those in shots.values() for shot in those]
     check_outputs(everything)
     remove_leftovers(everything)
-    with nullcontext(renderer) if renderer else Renderer() as lent:
+    with nullcontext(renderer) if renderer else Renderer(lone=len(everything) == 1) as lent:
         yield from _written_behind(_drawn_frames(opened, shots, lent, command, startup))
 
 
