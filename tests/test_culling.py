@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from build import camera, drawable, quad, scene, sphere, sun
 from defshade_cli.gpu.context import Gpu
+from defshade_cli.passes import culling
 from defshade_cli.passes.culling import may_see
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.passes.view import clip_from_camera
@@ -78,3 +79,18 @@ def test_the_picture_does_not_change_with_what_is_culled(gpu: Gpu, samples: int)
     pictures = [pipeline.render(each, make_plan(each, options)).layers["beauty"] for each in (apart, together)]
     np.testing.assert_array_equal(*pictures)
     assert pictures[0][..., 3].mean() > 0.5
+
+
+def test_commands_in_pieces_draw_what_they_draw_at_once(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From all of them at once to one by one; some place their mesh several times."""
+    meshes = [sphere(1.0, rings=6), quad(9.0, -9.0)]
+    places = [[translation(np.array([i - 3.0, 0.2 * j, -j]))] for i in range(5) for j in range(2)]
+    drawables = [drawable(meshes[0], 0, where=place * (1 + i % 3)) for i, place in enumerate(places)]
+    lit = scene(meshes, [sun()], drawables=[*drawables, drawable(meshes[1], 1)])
+    plan = make_plan(lit, RenderSettings(size=(64, 48), samples=2, layers=("beauty",)))
+    pictures = []
+    for most in (2**16, 300, 1):
+        monkeypatch.setattr(culling, "_MOST_QUEUED", most)
+        pictures.append(Pipeline(gpu).render(lit, plan).layers["beauty"])
+    np.testing.assert_array_equal(pictures[1], pictures[0])
+    np.testing.assert_array_equal(pictures[2], pictures[0])

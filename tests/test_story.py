@@ -126,3 +126,17 @@ def test_what_may_move_is_drawn_anew(
     job.stage.write_text(text)
     counted = drawings(job, monkeypatch)
     assert len(list(run(replace(job, settings=settings)))) == len(counted) == 3
+
+
+@pytest.mark.parametrize("layers", [("beauty",), ("beauty", "depth", "variance"), ("beauty", "crypto_object")])
+def test_a_single_image_is_that_of_a_job_with_more(job: RenderJob, layers: tuple[str, ...]) -> None:
+    """Its GBuffer is gone when it is read back; one sample and some, in tiles and whole, on a renderer used again."""
+    for samples in (1, 3):
+        asked = replace(job, settings=replace(job.settings, layers=layers, samples=samples), output=OutputSettings())
+        first = next(run(asked)).images[0].film
+        with Renderer(lone=True) as renderer:
+            for _ in range(2):
+                alone = next(run(replace(asked, frames=(1.0,)), renderer=renderer)).images[0].film
+                assert first is not None and alone is not None
+                for name in first.layers:
+                    np.testing.assert_array_equal(alone.layers[name], first.layers[name])

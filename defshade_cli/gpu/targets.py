@@ -57,11 +57,15 @@ class Target:
     @contextmanager
     def colours_kept(self) -> Iterator[None]:
         """Draw and clear the depth alone within the block, in which the framebuffer is bound."""
-        framebuffer: Any = self.framebuffer  # moderngl's own types know a mask for one texture
-        framebuffer.color_mask = [(False,) * 4] * len(self.textures)
-        framebuffer.use()
+        self._write_colours(False)
+        self.framebuffer.use()
         yield
-        framebuffer.color_mask = [(True,) * 4] * len(self.textures)
+        self._write_colours(True)
+
+    def _write_colours(self, written: bool) -> None:
+        framebuffer: Any = self.framebuffer  # moderngl's own types know a mask for one texture
+        mask = (written,) * 4
+        framebuffer.color_mask = [mask] * len(self.textures) if len(self.textures) > 1 else mask
 
     def release(self) -> None:
         """Free the framebuffer and its colour textures; a depth texture may be shared and is its maker's."""
