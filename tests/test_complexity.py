@@ -16,6 +16,7 @@ from defshade_cli.scene.view import View
 from defshade_cli.settings import COMPLEXITIES, RenderSettings
 from defshade_cli.usd import complexity
 from defshade_cli.usd.complexity import EDGE_PIXELS, FINEST_LEVEL, FLAT_PIXELS, choose_levels
+from defshade_cli.usd.flatness import rises
 from defshade_cli.usd.geometry import Surface, read_surface
 from prims import define_cube, define_mesh
 from stages import move
@@ -75,7 +76,7 @@ def test_the_rise_is_that_of_the_surface() -> None:
     faces = [[i, (i + 1) % 32, 32 + (i + 1) % 32, 32 + i] for i in range(32)]
     surface = read_surface(define_mesh(points, faces, "catmullClark").GetPrim(), Usd.TimeCode.Default())
     assert surface is not None
-    assert surface.rise == pytest.approx(1 - math.cos(math.pi / 32), rel=0.05)
+    assert rises([surface.polygons]) == pytest.approx([1 - math.cos(math.pi / 32)], rel=0.05)
 
 
 def test_the_nearest_and_largest_instance_counts() -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from defshade_cli.scene.geometry import world_boxes
 from defshade_cli.scene.view import View
 from defshade_cli.settings import Complexity
+from defshade_cli.usd.extent import bounds_of
+from defshade_cli.usd.flatness import mean_edges, rises
 from defshade_cli.usd.geometry import Surface
 
 UNIFORM_LEVELS: dict[Complexity, int] = {"low": 0, "medium": 1, "high": 2, "veryhigh": 3}
@@ -36,28 +38,34 @@ def choose_levels(
     """The level of each surface that `placed` gives with its world_from_object (N, 4, 4); 0 for polygons."""
     if complexity != "auto":
         return {s: UNIFORM_LEVELS[complexity] if s.control else 0 for s, _ in placed}
-    nearest: dict[Surface, float] = {}
-    for surface, world_from_object in placed:
-        nearest[surface] = max(_pixels_per_unit(surface, world_from_object, view), nearest.get(surface, 0.0))
+    listed = list(placed)
+    nearest = dict.fromkeys([surface for surface, _ in listed], 0.0)
+    curved = [(surface, matrices) for surface, matrices in listed if surface.control and len(matrices)]
+    for (surface, _), pixels in zip(curved, _pixels_per_unit(curved, view), strict=True):
+        nearest[surface] = max(pixels, nearest[surface])
     return _levels_in_budget(nearest)
 
 
-def _pixels_per_unit(surface: Surface, world_from_object: NDArray[np.float64], view: View) -> float:
-    """How large an object-space unit may appear in the nearest of its instances; 0 for polygons."""
-    if surface.control is None:
-        return 0.0
+def _pixels_per_unit(placed: Sequence[tuple[Surface, NDArray[np.float64]]], view: View) -> list[float]:
+    """How large an object-space unit of each may appear in the nearest of its instances."""
+    if not placed:
+        return []
+    counts = [len(matrices) for _, matrices in placed]
+    world_from_object = np.concatenate([matrices for _, matrices in placed])
+    boxes = np.repeat(bounds_of([surface.polygons for surface, _ in placed]), counts, axis=0)
     scale = np.linalg.norm(world_from_object[:, :3, :3], axis=1).max(axis=1)
-    density = view.pixels_per_unit(world_boxes(surface.polygons.bounds, world_from_object))
-    return float(np.max(scale * density, initial=0.0))
+    pixels = scale * view.pixels_per_unit(world_boxes(boxes, world_from_object))
+    greatest: list[float] = np.maximum.reduceat(pixels, np.cumsum([0, *counts])[:-1]).tolist()
+    return greatest
 
 
 def _levels_in_budget(nearest: Mapping[Surface, float]) -> dict[Surface, int]:
     """Refine what is farthest from its surface, again and again. `nearest`: pixels a unit of each."""
-    wanted = {surface: _wanted_level(surface, pixels) for surface, pixels in nearest.items()}
-    levels = dict.fromkeys(wanted, 0)
-    waiting = [(-s.rise * nearest[s], order, s) for order, (s, level) in enumerate(wanted.items()) if level]
+    wanted, rise = _wanted_levels(nearest)
+    levels = dict.fromkeys(nearest, 0)
+    waiting = [(-rise[s] * nearest[s], order, s) for order, (s, level) in enumerate(wanted.items()) if level]
     heapq.heapify(waiting)
-    left = TRIANGLE_BUDGET - sum(s.control.triangle_count(0) for s in wanted if s.control)
+    left = TRIANGLE_BUDGET - sum(s.control.triangle_count(0) for s in nearest if s.control)
     while waiting:
         distance, order, surface = heapq.heappop(waiting)
         assert surface.control is not None
@@ -71,14 +79,15 @@ def _levels_in_budget(nearest: Mapping[Surface, float]) -> dict[Surface, int]:
     return levels
 
 
-def _wanted_level(surface: Surface, pixels_per_unit: float) -> int:
-    if surface.control is None:
-        return 0
-    halvings = _halvings(surface.mean_edge * pixels_per_unit / EDGE_PIXELS)
-    if not halvings:
-        return 0
-    quarterings = _halvings(surface.rise * pixels_per_unit / FLAT_PIXELS) / 2.0
-    return min(math.ceil(min(halvings, quarterings)), FINEST_LEVEL)
+def _wanted_levels(nearest: Mapping[Surface, float]) -> tuple[dict[Surface, int], dict[Surface, float]]:
+    """Of the surfaces whose edges are long in the picture, and how far those rise over their cages."""
+    curved = [surface for surface in nearest if surface.control]
+    edges = mean_edges([surface.polygons for surface in curved])
+    halvings = {s: _halvings(edge * nearest[s] / EDGE_PIXELS) for s, edge in zip(curved, edges, strict=True)}
+    coarse = [surface for surface, number in halvings.items() if number]
+    rise = dict(zip(coarse, rises([surface.polygons for surface in coarse]), strict=True))
+    quarterings = {surface: _halvings(rise[surface] * nearest[surface] / FLAT_PIXELS) / 2.0 for surface in coarse}
+    return {s: min(math.ceil(min(halvings[s], quarterings[s])), FINEST_LEVEL) for s in coarse}, rise
 
 
 def _halvings(excess: float) -> float:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast, get_args
-from weakref import WeakKeyDictionary
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ CONTROL_ATTRIBUTES = (
 )
 """What is read of a Mesh that may vary over time, besides what its polygons need."""
 
-_PLAIN: WeakKeyDictionary[Polygons, Topology] = WeakKeyDictionary()
+_PLAIN: WeakValueDictionary[Hashable, Topology] = WeakValueDictionary()
 _FACE_VARYING_FALLBACK: LinearInterpolation = "cornersPlus1"
 
 
@@ -78,18 +79,19 @@ def smooth_control(polygons: Polygons) -> Control | None:
 
 
 def _plain_topology(polygons: Polygons) -> Topology:
-    """With the schema's rules, and without creases and corners; once for polygons that surfaces share."""
+    """With the schema's rules, and without creases and corners; the same for polygons that are wired alike."""
     from defshade_cli.usd.subdivision import Topology
 
-    if polygons not in _PLAIN:
-        _PLAIN[polygons] = Topology(
+    known = _PLAIN.get(polygons.wiring)
+    if known is None:
+        known = _PLAIN[polygons.wiring] = Topology(
             face_counts=polygons.counts,
             face_indices=polygons.indices,
             vertex_count=len(polygons.points),
             scheme=cast("SchemeName", polygons.scheme),
             holes=np.flatnonzero(np.isin(polygons.faces, polygons.holes)),
         )
-    return _PLAIN[polygons]
+    return known
 
 
 def _read_topology(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode) -> Topology:

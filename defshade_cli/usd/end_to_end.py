@@ -6,6 +6,7 @@ Each NumPy call takes as long as some thousand numbers in it, so that small mesh
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -17,7 +18,7 @@ from defshade_cli.usd.polygons import Polygons, Primvar, varying
 LARGEST = 1 << 12
 """Corners of a mesh that is small."""
 
-_CORNERS_AT_ONCE = 1 << 18
+CORNERS_AT_ONCE = 1 << 18
 
 
 class Row(NamedTuple):
@@ -40,36 +41,45 @@ def signature(mesh: Polygons) -> Hashable:
     return mesh.scheme, mesh.left_handed, lying, uvs, shown
 
 
-def blocks(meshes: Sequence[Polygons]) -> Iterator[Sequence[Polygons]]:
-    """Runs of the meshes, none of much more than _CORNERS_AT_ONCE unless a mesh has."""
+def blocks(meshes: Sequence[Polygons], at_once: int = CORNERS_AT_ONCE) -> Iterator[Sequence[Polygons]]:
+    """Runs of the meshes, none of much more corners than `at_once` unless one mesh has as many."""
     ends = np.cumsum([len(mesh.indices) for mesh in meshes])
-    firsts = np.searchsorted(ends, np.arange(0, ends[-1], _CORNERS_AT_ONCE), "right")
+    firsts = np.searchsorted(ends, np.arange(0, ends[-1], at_once), "right")
     for first, end in pairwise([*np.unique(firsts).tolist(), len(meshes)]):
         yield meshes[first:end]
 
 
-def lay(meshes: Sequence[Polygons]) -> Row:
+def lay(meshes: Sequence[Polygons], *, bare: bool = False) -> Row:
     """One mesh of all, which have one signature, without their holes, and without the colours that all of one has.
 
-    Other constants become values of points.
+    Other constants become values of points.  bare: without what lies on them, which may differ.
     """
-    starts = [[len(array) for array in arrays] for arrays in _arrays(meshes)]
-    points, faces, corners = (np.cumsum([0, *sizes], dtype=np.intp) for sizes in starts)
+    sizes = [[len(array) for array in arrays] for arrays in _arrays(meshes)]
+    points, faces, corners = (np.cumsum([0, *some], dtype=np.intp) for some in sizes)
     first = meshes[0]
     whole = Polygons(
         points=np.concatenate([mesh.points for mesh in meshes]),
         counts=np.concatenate([mesh.counts for mesh in meshes]),
-        indices=np.concatenate([mesh.indices for mesh in meshes]) + np.repeat(points[:-1], starts[2]),
+        indices=np.concatenate([mesh.indices for mesh in meshes]) + np.repeat(points[:-1], sizes[2]),
         faces=np.concatenate([mesh.faces for mesh in meshes]),
         scheme=first.scheme,
         left_handed=first.left_handed,
-        normals=_joined([mesh.normals for mesh in meshes], starts[0]),
-        display_color=_joined([varying(mesh.display_color) for mesh in meshes], starts[0]),
-        display_opacity=_joined([varying(mesh.display_opacity) for mesh in meshes], starts[0]),
-        uvs=_all_joined([mesh.uvs for mesh in meshes], starts[0]),
-        shown=_all_joined([mesh.shown for mesh in meshes], starts[0]),
     )
-    return Row(whole, points, faces, corners)
+    return Row(whole if bare else _dressed(whole, meshes, sizes[0]), points, faces, corners)
+
+
+def _dressed(whole: Polygons, meshes: Sequence[Polygons], points: Sequence[int]) -> Polygons:
+    """points: of each mesh."""
+    if not meshes[0].primvars:
+        return whole
+    return replace(
+        whole,
+        normals=_joined([mesh.normals for mesh in meshes], points),
+        display_color=_joined([varying(mesh.display_color) for mesh in meshes], points),
+        display_opacity=_joined([varying(mesh.display_opacity) for mesh in meshes], points),
+        uvs=_all_joined([mesh.uvs for mesh in meshes], points),
+        shown=_all_joined([mesh.shown for mesh in meshes], points),
+    )
 
 
 def _arrays(meshes: Sequence[Polygons]) -> Iterable[list[NDArray[Any]]]:
@@ -84,7 +94,6 @@ def _all_joined(named: Sequence[Mapping[str, Primvar]], points: Sequence[int]) -
 
 
 def _joined(primvars: Sequence[Primvar | None], points: Sequence[int]) -> Primvar | None:
-    """points: of each mesh."""
     values = [primvar.values for primvar in primvars if primvar is not None]
     if not values or primvars[0] is None:
         return None

@@ -22,7 +22,6 @@ from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.control import CONTROL_ATTRIBUTES, Control, read_control, smooth_control
 from defshade_cli.usd.copies import Copies
 from defshade_cli.usd.cut import Cut, cut
-from defshade_cli.usd.flatness import mean_edge, rise
 from defshade_cli.usd.gprims import read_solid, size_attributes
 from defshade_cli.usd.mesh import MESH_ATTRIBUTES, read_mesh
 from defshade_cli.usd.normals import with_normals
@@ -75,16 +74,6 @@ class Surface:
     display_opacity: float | None
     issues: tuple[Unsupported, ...]
     strands: Strands | None = None
-
-    @property
-    def mean_edge(self) -> float:
-        """Root of the mean square of the edges' lengths, in scene units."""
-        return mean_edge(self.polygons)
-
-    @property
-    def rise(self) -> float:
-        """How far the surface rises over its cage, in scene units."""
-        return rise(self.polygons)
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)

@@ -160,6 +160,17 @@ class Polygons:
             return self
         return replace(self, display_color=color, display_opacity=opacity)
 
+    @cached_property
+    def wiring(self) -> Hashable:
+        """Equal for polygons of one scheme that join as many points alike, and have the same holes."""
+        arrays = [self.counts, self.indices]
+        if len(self.holes):
+            arrays.append(np.flatnonzero(np.isin(self.faces, self.holes)))
+        said = self.scheme, len(self.points), *[array.dtype.char for array in arrays]
+        if len(self.indices) <= _FEW_CORNERS:
+            return said, *[array.tobytes() for array in arrays]
+        return said, *[blake2b(np.ascontiguousarray(array).data, digest_size=16).digest() for array in arrays]
+
     def digest(self) -> Hashable:
         """Equal for polygons that are equal in everything: of few corners their bytes, else a hash of these."""
         arrays = [self.points, self.counts, self.indices, self.faces, self.holes]

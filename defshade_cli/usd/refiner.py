@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.usd.control import Control
 from defshade_cli.usd.normals import smooth
-from defshade_cli.usd.polygons import Polygons, Primvar
+from defshade_cli.usd.polygons import Interpolation, Polygons, Primvar
 from defshade_cli.usd.subdivision import Stencils, limit, refine, refine_face_varying
 from defshade_cli.usd.welding import weld
 
@@ -29,8 +29,22 @@ class Weights:
         self._control, self._level = control, level
         self._face_varying: dict[bytes, FaceVarying] = {}
 
-    def face_varying(self, number: NDArray[np.int32], count: int) -> FaceVarying:
-        """Of primvars with `count` values. number: (C,) which of them each corner has."""
+    def carried(self, values: NDArray[np.floating], interpolation: Interpolation) -> NDArray[np.float64]:
+        """A primvar (N, ...) of points or faces, on the surface."""
+        match interpolation:
+            case "uniform":
+                return values[self.refinement.parents].astype(np.float64)
+            case "varying":
+                return (self.refinement.varying @ values)[self.limit.vertices]
+            case _:
+                return self.limit.at(self.refinement.vertex @ values)
+
+    def carried_corners(self, values: NDArray[np.floating], number: NDArray[np.int32]) -> NDArray[np.float64]:
+        """A primvar of corners. values: (N, ...) distinct ones.  number: (C,) which of them each corner has."""
+        stencils, at = self._face_varying_of(number, len(values))
+        return (stencils @ values)[at]
+
+    def _face_varying_of(self, number: NDArray[np.int32], count: int) -> FaceVarying:
         key = number.tobytes()
         if key not in self._face_varying:
             if len(self._face_varying) == _MOST_KEPT:
@@ -71,10 +85,10 @@ class Refiner:
 
     def refine(self, cage: Polygons) -> Polygons:
         """The surface of a cage with this topology. Holes are left out, and what no boundary rule bounds."""
-        refined = self._refinement.vertex @ np.where(np.isfinite(cage.points), cage.points, 0.0)
+        refined = self._refinement.vertex @ only_finite(cage.points)
         surface = replace(
             cage,
-            points=(self._limit.position @ refined)[self._limit.vertices].astype(np.float32),
+            points=self._limit.at(refined).astype(np.float32),
             counts=self._refinement.face_counts,
             indices=self._limit.sectors,
             faces=cage.faces[self._refinement.parents],
@@ -94,22 +108,17 @@ class Refiner:
 
     def _carried(self, primvar: Primvar, cage: Polygons) -> Primvar:
         """A primvar of the cage on the surface."""
-        values: NDArray[np.floating] = primvar.values
         match primvar.interpolation:
             case "constant":
                 return primvar
-            case "uniform":
-                values = values[self._refinement.parents]
-            case "vertex":
-                values = (self._limit.position @ (self._refinement.vertex @ values))[self._limit.vertices]
-            case "varying":
-                values = (self._refinement.varying @ values)[self._limit.vertices]
-            case _:
-                values = self._carried_corners(primvar.values, cage)
+            case "faceVarying":  # corners with one value at one point are one: it is smooth across their edge
+                number, chosen = weld(cage.indices, primvar.values)
+                values = self._weights.carried_corners(primvar.values[chosen], number)
+            case interpolation:
+                values = self._weights.carried(primvar.values, interpolation)
         return replace(primvar, values=values.astype(np.float32))
 
-    def _carried_corners(self, values: NDArray[np.float32], cage: Polygons) -> NDArray[np.float64]:
-        """Corners with one value at one point are one, so that the primvar is smooth across their edge."""
-        number, chosen = weld(cage.indices, values)
-        stencils, at = self._weights.face_varying(number, len(chosen))
-        return (stencils @ values[chosen])[at]
+
+def only_finite(points: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Those that no face uses may be anything."""
+    return np.where(np.isfinite(points), points, np.float32(0.0))

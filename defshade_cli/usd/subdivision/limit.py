@@ -22,7 +22,7 @@ from defshade_cli.usd.subdivision.creases import SMOOTH, vertex_rules
 from defshade_cli.usd.subdivision.fans import Fans, walk
 from defshade_cli.usd.subdivision.refinement import Refinement
 from defshade_cli.usd.subdivision.schemes import Scheme, scheme_of
-from defshade_cli.usd.subdivision.stencil import Entries, Masks, assemble
+from defshade_cli.usd.subdivision.stencil import Entries, Masks, applied, assemble
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -43,9 +43,14 @@ class Limit:
     vertices: Indices
     sectors: Indices
 
+    def at(self, refined: NDArray[Any]) -> NDArray[np.float64]:
+        """(S, ...) where refined points (V, ...), or primvars, end."""
+        return applied(self.position, refined)[self.vertices]
+
     def normals(self, refined_points: NDArray[Any]) -> NDArray[np.float64]:
-        """(S, 3) unit normals for points (V, 3); zero where the surface has collapsed."""
-        return normalize(np.cross(self.tangent1 @ refined_points, self.tangent2 @ refined_points))
+        """(S, ..., 3) unit normals for points (V, ..., 3); zero where the surface has collapsed."""
+        first, second = applied(self.tangent1, refined_points), applied(self.tangent2, refined_points)
+        return normalize(np.cross(first, second))
 
 
 def limit(refinement: Refinement) -> Limit:

@@ -33,6 +33,14 @@ def _used(entries: Entries) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.floa
     return (rows, columns, weights) if len(used) == len(rows) else (rows[used], columns[used], weights[used])
 
 
+def applied(masks: Masks, values: NDArray[Any]) -> NDArray[Any]:
+    """(rows, ...) values from (columns, ...) ones."""
+    if values.ndim <= 2:
+        return masks @ values
+    flat: NDArray[Any] = masks @ values.reshape(len(values), -1)
+    return flat.reshape(-1, *values.shape[1:])
+
+
 def identity(count: int) -> Masks:
     """The masks (count, count) that change nothing."""
     from scipy import sparse
@@ -51,7 +59,7 @@ class Stencils:
 
     def __matmul__(self, values: NDArray[Any]) -> NDArray[np.float64]:
         """(N, ...) values from (control N, ...) ones."""
-        return reduce(lambda finer, mask: mask @ finer, self.masks, np.asarray(values, np.float64))
+        return reduce(lambda finer, mask: applied(mask, finer), self.masks, np.asarray(values, np.float64))
 
     def then(self, mask: Masks) -> Stencils:
         """The stencils with one more mask (rows, columns) applied."""

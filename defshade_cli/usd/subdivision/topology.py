@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from hashlib import blake2b
 from typing import Any, Literal, get_args
@@ -24,7 +25,7 @@ def _no_sharpnesses() -> NDArray[np.float64]:
     return np.zeros(0)
 
 
-@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+@dataclass(frozen=True, eq=False, slots=True, weakref_slot=True, kw_only=True)
 class Topology:
     """UsdGeomMesh's topology attributes; the schema's text says what each means.
 
@@ -101,6 +102,32 @@ class Topology:
         _require_range("corner index", self.corner_indices, self.vertex_count, "points")
         if np.isnan(self.corner_sharpnesses).any():
             raise ValueError("a corner sharpness is not a number")
+
+    @classmethod
+    def end_to_end(cls, parts: Sequence[Topology]) -> Topology:
+        """One of all `parts`, which have the same rules."""
+        first = parts[0]
+        points = np.cumsum([0, *(part.vertex_count for part in parts)])
+        faces = np.cumsum([0, *(len(part.face_counts) for part in parts)])
+
+        def laid(name: str, offsets: NDArray[Any]) -> NDArray[Any]:
+            arrays = [getattr(part, name) for part in parts]
+            return np.concatenate(arrays) + np.repeat(offsets[:-1], [len(array) for array in arrays])
+
+        return cls(
+            face_counts=np.concatenate([part.face_counts for part in parts]),
+            face_indices=laid("face_indices", points),
+            vertex_count=int(points[-1]),
+            scheme=first.scheme,
+            interpolate_boundary=first.interpolate_boundary,
+            triangle_subdivision_rule=first.triangle_subdivision_rule,
+            holes=laid("holes", faces),
+            crease_indices=laid("crease_indices", points),
+            crease_lengths=np.concatenate([part.crease_lengths for part in parts]),
+            crease_sharpnesses=np.concatenate([part.crease_edges()[1] for part in parts]),
+            corner_indices=laid("corner_indices", points),
+            corner_sharpnesses=np.concatenate([part.corner_sharpnesses for part in parts]),
+        )
 
     def equals(self, other: Topology) -> bool:
         """Do both describe the same mesh, so that stencils of one serve the other?"""
