@@ -42,6 +42,17 @@ class Control:
     topology: Topology
     face_varying: LinearInterpolation = _FACE_VARYING_FALLBACK
 
+    @property
+    def rules(self) -> Hashable:
+        """What cages have in common that can be refined as one."""
+        topology = self.topology
+        return (
+            topology.scheme,
+            topology.interpolate_boundary,
+            topology.triangle_subdivision_rule,
+            self.face_varying,
+        )
+
     def equals(self, other: Control) -> bool:
         """Whether both subdivide alike: topology and face-varying indices are the same."""
         return self.face_varying == other.face_varying and (

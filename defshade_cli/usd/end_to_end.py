@@ -8,12 +8,14 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.usd.polygons import Polygons, Primvar, varying
+
+T = TypeVar("T")
 
 LARGEST = 1 << 12
 """Corners of a mesh that is small."""
@@ -41,12 +43,12 @@ def signature(mesh: Polygons) -> Hashable:
     return mesh.scheme, mesh.left_handed, lying, uvs, shown
 
 
-def blocks(meshes: Sequence[Polygons], at_once: int = CORNERS_AT_ONCE) -> Iterator[Sequence[Polygons]]:
-    """Runs of the meshes, none of much more corners than `at_once` unless one mesh has as many."""
-    ends = np.cumsum([len(mesh.indices) for mesh in meshes])
+def blocks(items: Sequence[T], corners: Sequence[int], at_once: int = CORNERS_AT_ONCE) -> Iterator[Sequence[T]]:
+    """Runs of the items, none of much more corners than `at_once` unless one item has them. corners: of each."""
+    ends = np.cumsum(corners)
     firsts = np.searchsorted(ends, np.arange(0, ends[-1], at_once), "right")
-    for first, end in pairwise([*np.unique(firsts).tolist(), len(meshes)]):
-        yield meshes[first:end]
+    for first, end in pairwise([*np.unique(firsts).tolist(), len(items)]):
+        yield items[first:end]
 
 
 def lay(meshes: Sequence[Polygons], *, bare: bool = False) -> Row:

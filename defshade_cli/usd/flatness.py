@@ -36,7 +36,7 @@ def _each_once(measured: Measure) -> Callable[[Sequence[Polygons]], list[float]]
             if each not in known:
                 alike[each.scheme, each.left_handed].append(each)
         for group in alike.values():
-            for block in blocks(group):
+            for block in blocks(group, [len(mesh.indices) for mesh in group]):
                 known.update(zip(block, measured(lay(block, bare=True)).tolist(), strict=True))
         return [known[each] for each in polygons]
 

@@ -146,11 +146,17 @@ def _elements(polygons: Polygons) -> Elements:
 
 
 def tessellate(
-    surface: Surface, refiner: Refiner | None = None, last: Gprim | None = None, shaped: Shaped | None = None
+    surface: Surface,
+    refiner: Refiner | None = None,
+    last: Gprim | None = None,
+    shaped: Shaped | None = None,
+    *,
+    level: int = 0,
 ) -> Gprim:
     """The surface in triangles; without a refiner its cage.
 
-    last: an earlier one, of which is kept what fits.  shaped: what is known of it, and then taken whole.
+    last: an earlier one, of which is kept what fits.
+    shaped: what is known of it, refined `level` times, and then taken whole.
     """
     if shaped:
         refined, last = shaped.polygons, None
@@ -159,10 +165,10 @@ def tessellate(
     polygons = shared(refined, last.cut.polygons) if last else refined
     known = last.cut.moved(polygons, surface.faces) if last else None
     made = known or cut(polygons, surface.faces, surface.path, shaped, double_sided=surface.double_sided)
-    level = (refiner.level if refiner else 0) if surface.control else None
+    refined_to = (refiner.level if refiner else level) if surface.control else None
     mesh = made.mesh
-    if (mesh.double_sided, mesh.level) != (surface.double_sided, level):
-        mesh = replace(mesh, double_sided=surface.double_sided, level=level)
+    if (mesh.double_sided, mesh.level) != (surface.double_sided, refined_to):
+        mesh = replace(mesh, double_sided=surface.double_sided, level=refined_to)
     return Gprim(mesh, made.groups, tuple([Unsupported(surface.path, issue) for issue in made.issues]), made)
 
 

@@ -58,7 +58,8 @@ class Weights:
 _KNOWN: WeakValueDictionary[tuple[bytes, str, int], Weights] = WeakValueDictionary()
 
 
-def _weights(control: Control, level: int) -> Weights:
+def weights_of(control: Control, level: int) -> Weights:
+    """The same for meshes that are wired alike."""
     key = control.topology.digest(), control.face_varying, level
     known = _KNOWN.get(key)
     if known is None:
@@ -75,7 +76,7 @@ class Refiner:
 
     def __init__(self, control: Control, level: int) -> None:
         self.control, self.level = control, level
-        self._weights = _weights(control, level)
+        self._weights = weights_of(control, level)
         self._refinement, self._limit = self._weights.refinement, self._weights.limit
         self._last: dict[Primvar, Primvar] = {}
 

@@ -34,7 +34,7 @@ def shape_all(meshes: Iterable[Polygons]) -> dict[Polygons, Shaped]:
         alike[signature(mesh)].append(mesh)
     shaped: dict[Polygons, Shaped] = {}
     for group in alike.values():
-        for block in blocks(group):
+        for block in blocks(group, [len(mesh.indices) for mesh in group]):
             for row_of, row in _joined(block):
                 shaped.update(zip(row_of, map(Shaped, row_of, _shape(row)), strict=True))
     return shaped

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -29,24 +30,24 @@ class Tessellation:
         self._refiners: dict[str, Refiner] = {}
 
     def at_levels(self, levels: Mapping[Surface, int]) -> dict[Surface, Gprim]:
-        """Of surfaces that have none yet, small ones are shaped together."""
-        unknown = (
-            surface.polygons
+        """Of surfaces that have none yet, small ones are refined and shaped together."""
+        unknown = {
+            surface: level
             for surface, level in levels.items()
-            if level == 0 and surface.path not in self._gprims and surface.polygons not in self._of_shape
-        )
-        shaped = shape_all(unknown)
-        return {
-            surface: self.at_level(surface, level, shaped.get(surface.polygons)) for surface, level in levels.items()
+            if surface.path not in self._gprims and surface.polygons not in self._of_shape
         }
+        drawn = {surface: surface.polygons for surface, level in unknown.items() if level == 0} | _refined(unknown)
+        shaped = shape_all(drawn.values())
+        known = {surface: shaped[polygons] for surface, polygons in drawn.items() if polygons in shaped}
+        return {surface: self.at_level(surface, level, known.get(surface)) for surface, level in levels.items()}
 
     def at_level(self, surface: Surface, level: int, shaped: Shaped | None = None) -> Gprim:
-        """Level 0 is the cage; what is no subdivision surface has no other. shaped: see tessellate, of level 0."""
+        """Level 0 is the cage; what is no subdivision surface has no other. shaped: see tessellate, of this level."""
         known, at, gprim = self._gprims.get(surface.path, (None, 0, None))
         if gprim is None or known is not surface or at != level:
             last = gprim if at == level else None
             cut = self._shared if surface.faces.group is None else self._cut
-            gprim = cut(surface, level, last, shaped if level == 0 else None)
+            gprim = cut(surface, level, last, shaped)
             self._gprims[surface.path] = surface, level, gprim
         return gprim
 
@@ -63,8 +64,9 @@ class Tessellation:
         return gprim
 
     def _cut(self, surface: Surface, level: int, last: Gprim | None, shaped: Shaped | None) -> Gprim:
-        refiner = self._refiner(surface.path, surface.control, level) if surface.control and level else None
-        return tessellate(surface, refiner, last, shaped)
+        if shaped or not surface.control or not level:
+            return tessellate(surface, None, last, shaped, level=level)
+        return tessellate(surface, self._refiner(surface.path, surface.control, level), last)
 
     def _refiner(self, path: str, control: Control, level: int) -> Refiner:
         known = self._refiners.get(path)
@@ -88,6 +90,22 @@ class _Alike(NamedTuple):
             return False
         mine, other = self.control, surface.control
         return mine is other or (mine is not None and other is not None and mine.equals(other))
+
+
+def _refined(levels: Mapping[Surface, int]) -> dict[Surface, Polygons]:
+    """Of those that have a level and are small. Of several that share their polygons only the first one is made."""
+    first: dict[Polygons, tuple[Surface, Control, int]] = {}
+    for surface, level in levels.items():
+        if level and surface.control:
+            first.setdefault(surface.polygons, (surface, surface.control, level))
+    if not first:
+        return {}
+    from defshade_cli.usd.small_cages import Cage, refine_all
+
+    cages: dict[int, dict[Cage, Surface]] = defaultdict(dict)
+    for surface, control, level in first.values():
+        cages[level][Cage(surface.polygons, control)] = surface
+    return {alike[cage]: made for level, alike in cages.items() for cage, made in refine_all(alike, level).items()}
 
 
 def _renamed(gprim: Gprim, surface: Surface) -> Gprim:
