@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from build import bulb, quad, scene, sun
 from defshade_cli import render
-from defshade_cli.passes.light_lists import TILE, LightBounds, list_lights, tile_boxes
+from defshade_cli.passes.light_lists import TILE, list_lights, tile_boxes
 from defshade_cli.passes.screen import regions_of
 from defshade_cli.plan import make_plan
+from defshade_cli.plan.bounds import LightBounds
 from defshade_cli.plan.cost import covered_share
 from defshade_cli.settings import LIGHTINGS, RenderSettings
 

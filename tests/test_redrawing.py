@@ -28,7 +28,7 @@ SUN = """def DistantLight "sun" {
 """
 BULB = f"""def SphereLight "bulb" {{
     float inputs:intensity = 60
-    float inputs:radius = 0.2
+    float inputs:radius = 0.05
     {move(3, 5, 2)}
 }}
 """
@@ -37,11 +37,12 @@ FLOOR = f"""def Cube "floor" {{
     {move(y=-21)}
 }}
 def Sphere "still" {{
-    {move(3, 1)}
+    {move(3, 3)}
 }}
 """
 MOVING = """
-    double3 xformOp:translate.timeSamples = { 1: (-3, 0, 0), 2: (-2.7, 0.4, 0.3), 3: (-2.2, 0, 0), 4: (-2.2, 0, 0) }
+    double radius = 0.5
+    double3 xformOp:translate.timeSamples = { 1: (-3, 2, 0), 2: (-2.7, 2.4, 0.3), 3: (-2.2, 2, 0), 4: (-2.2, 2, 0) }
     uniform token[] xformOpOrder = ["xformOp:translate"]
 """
 LOOK = """def Material "look" {
@@ -76,7 +77,7 @@ INSTANCES = """def PointInstancer "many" {
 TURNED = BULB.replace("float inputs:intensity = 60", "float inputs:intensity.timeSamples = { 1: 60, 4: 30 }")
 DOME = 'def DomeLight "sky" {}\n'
 DATA = ("beauty", "alpha", "depth", "normal", "position", "primId", "instanceId", "uv", "albedo", "specular")
-SIZE = (128, 96)
+SIZE = (192, 144)
 
 
 @pytest.fixture(scope="module")
@@ -112,8 +113,11 @@ def drawn(job: RenderJob, renderer: Renderer) -> tuple[list[Film], list[str]]:
         (BALL, {"layout": "packed", "lighting": "tiles"}),
         (GLASS, {"samples": 3, "layers": ("beauty", "diffuse", "light:bulb")}),
         (INSTANCES, {"layers": DATA}),
+        (BALL, {"shadows": True, "layers": ("beauty", "shadow")}),
+        (BALL, {"shadows": True, "samples": 3, "lighting": "volumes"}),
+        (GLASS, {"shadows": True, "samples": 2, "lighting": "tiles"}),
     ],
-    ids=["plain", "data", "volumes", "tiles", "glass", "instances"],
+    ids=["plain", "data", "volumes", "tiles", "glass", "instances", "shadows", "soft", "thin"],
 )
 def test_a_part_is_drawn_and_the_picture_is_equal(
     moving: str, settings: dict[str, Any], tmp_path: Path, renderer: Renderer
@@ -132,6 +136,7 @@ def test_a_part_is_drawn_and_the_picture_is_equal(
     ("text", "settings"),
     [
         (TURNED + FLOOR + BALL, {}),
+        (SUN + FLOOR.replace("(3, 3, 0)", "(3, -9, 0)") + BALL, {"shadows": True}),
         (SUN + BULB + FLOOR + BALL, {"layers": ("beauty", "motionForward")}),
         (SUN + BULB + FLOOR + BALL, {"layers": ("beauty", "cryptoObject")}),
         (SUN + BULB + FLOOR + BALL, {"samples": 2, "max_error": 0.5}),

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from defshade_cli.gpu.targets import pixels_of
 from defshade_cli.passes.light_lists import TILE, tile_grid
 from defshade_cli.passes.screen import regions_of
-from defshade_cli.passes.view import lens_radius
 from defshade_cli.plan import Plan
 from defshade_cli.spaces import transform_points
 
@@ -60,7 +59,7 @@ def _rectangles(boxes: NDArray[np.float64], plan: Plan) -> NDArray[np.float64]:
         scale = np.maximum(depth, np.finfo(float).tiny)
     pixels = np.array([width / (right - left), height / (top - bottom)])
     places = np.stack([seen[..., 0] / scale - left, top - seen[..., 1] / scale], axis=-1) * pixels
-    blur = lens_radius(camera) * np.abs(1.0 / (camera.focus_distance or np.inf) - 1.0 / scale)
+    blur = camera.lens_radius * np.abs(1.0 / (camera.focus_distance or np.inf) - 1.0 / scale)
     margin = blur.max(axis=1, initial=0.0)[:, None] * pixels + 0.5 * plan.filter_width + _ROUNDING
     found = np.hstack([places.min(axis=1) - margin, places.max(axis=1) + margin])
     found[depth.min(axis=1) <= 0.0] = 0.0, 0.0, width, height

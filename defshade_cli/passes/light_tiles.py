@@ -21,7 +21,7 @@ from defshade_cli.gpu.records import record
 from defshade_cli.gpu.residence import LIGHT_BLOCK, LIGHT_LISTS, RecordBuffer
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer
-from defshade_cli.passes.light_lists import TILE, LightBounds, list_lights, tile_boxes, tile_grid
+from defshade_cli.passes.light_lists import TILE, list_lights, tile_boxes, tile_grid
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.light_traits import Traits, common_traits, lights_source
 from defshade_cli.passes.lighting import LightingVariant
@@ -29,6 +29,7 @@ from defshade_cli.passes.screen import Screen, regions_of
 from defshade_cli.passes.shadow_atlas import ShadowAtlas, kind_of
 from defshade_cli.passes.tables import NO_TABLES, LightTables
 from defshade_cli.plan import Plan, PlannedLight
+from defshade_cli.plan.bounds import LightBounds
 from defshade_cli.settings import Layout
 
 _MOST_LIGHTS = 256

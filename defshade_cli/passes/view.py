@@ -47,18 +47,11 @@ def lens_offset(camera: Camera, u: tuple[float, float]) -> NDArray[np.float64]:
     Square to disk: Shirley & Chiu 1997, "A Low Distortion Map Between Disk and Square".
     """
     a, b = 2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0
-    radius = lens_radius(camera)
+    radius = camera.lens_radius
     if radius == 0.0 or a == b == 0.0:
         return np.zeros(3)
     r, angle = (a, math.pi / 4 * b / a) if abs(a) > abs(b) else (b, math.pi / 2 - math.pi / 4 * a / b)
     return radius * r * np.array([math.cos(angle), math.sin(angle), 0.0])
-
-
-def lens_radius(camera: Camera) -> float:
-    """Scene units; zero for a pinhole, an orthographic camera, or one without a focus distance."""
-    if camera.f_stop <= 0.0 or camera.focus_distance <= 0.0 or camera.projection != "perspective":
-        return 0.0
-    return 0.5 * camera.focal_length / camera.f_stop
 
 
 def _seen_from(lens: NDArray[np.float64], camera: Camera, window: Window) -> Window:

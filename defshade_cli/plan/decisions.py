@@ -102,7 +102,9 @@ def _explain_redrawing(plan: Plan) -> Decision:
     redrawing = plan.redrawing
     if redrawing.boxes is None:
         return Decision("redrawing", "all", redrawing.reason)
-    return Decision("redrawing", "a part", f"all but {redrawing.moved} instances is as in the frame before")
+    return Decision(
+        "redrawing", "a part", f"instances that changed since the frame before, {redrawing.moved}, and their shadows"
+    )
 
 
 def _kept(subject: str, kept: bool, why: str, why_not: str) -> Decision:

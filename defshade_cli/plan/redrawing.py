@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.plan.shadow_reach import shadowed_boxes
 from defshade_cli.scene.geometry import Drawable, world_boxes
 from defshade_cli.scene.light import CylinderLight
 from defshade_cli.scene.scene import Scene
@@ -26,11 +27,16 @@ _APART = frozenset(("camera", "display_camera", "lights", "redrawing", "levels",
 """Fields of a plan that are compared otherwise, or that no pixel depends on."""
 
 
+_SHADOW_PIXELS = 64.0
+"""Boxes of shadows that look smaller are not cut."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Redrawing:
     """reason: why all of the image is drawn; empty where only a part is.
 
-    boxes: (N, 2, 3) world space, around what changed as it was and as it is.  moved: instances that changed.
+    boxes: (N, 2, 3) world space, around what changed as it was and as it is, and where shadows of it may fall.
+    moved: instances that changed.
     """
 
     reason: str = ""
@@ -43,12 +49,29 @@ WHOLE = Redrawing("no frame before it is known")
 
 def find_redrawing(before: Scene, planned: Plan, scene: Scene, plan: Plan) -> Redrawing:
     """Of `scene` after `before`, each with its plan."""
-    reason = next(_reasons(before, planned, scene, plan), "")
-    changed = None if reason else _changed_rows(before, scene)
+    if reason := next(_reasons(before, planned, scene, plan), ""):
+        return Redrawing(reason)
+    changed = _changed_rows(before, scene)
     if changed is None:
-        return Redrawing(reason or "other things are drawn")
-    boxes = np.concatenate([_boxes(one, changed) for one in (before, scene)])
-    return Redrawing("", boxes, len(changed)) if np.isfinite(boxes).all() else Redrawing("what moves is not finite")
+        return Redrawing("other things are drawn")
+    moved = np.concatenate([_boxes(one, changed) for one in (before, scene)])
+    if not np.isfinite(moved).all():
+        return Redrawing("what moves is not finite")
+    shadowed = _shadowed(scene, plan, moved, np.concatenate([_radii(one, changed) for one in (before, scene)]))
+    if shadowed is None:
+        return Redrawing("shadows of what moves fall far and wide")
+    return Redrawing("", np.concatenate([moved, shadowed]), len(changed))
+
+
+def _shadowed(
+    scene: Scene, plan: Plan, moved: NDArray[np.float64], radii: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    lights = [planned for planned in plan.lights if plan.shadows and planned.light.casts_shadow]
+    if not (lights and len(moved)):
+        return moved[:0]
+    left, right, _, _ = plan.camera.window
+    side = _SHADOW_PIXELS * (right - left) / plan.size[0]
+    return shadowed_boxes(scene, lights, plan.shadow_resolution, (moved.mean(axis=1), radii), side)
 
 
 def _reasons(before: Scene, planned: Plan, scene: Scene, plan: Plan) -> Iterator[str]:
@@ -63,20 +86,16 @@ def _reasons(before: Scene, planned: Plan, scene: Scene, plan: Plan) -> Iterator
     if any(not _same(getattr(planned, name), getattr(plan, name)) for name in kept):
         yield "it is planned otherwise"
     fitted = plan.shadows or any(isinstance(planned.light, CylinderLight) for planned in plan.lights)
-    if fitted and not (_are_same_bounds(before, scene) and planned.depths == plan.depths):
+    if fitted and not (np.array_equal(before.bounds, scene.bounds) and planned.depths == plan.depths):
         yield "lights are fitted to other bounds"
-    if plan.shadows:
-        yield "shadows fall anywhere"
+    if plan.shadows_lamps or any(plan.shadows_sky(dome) for dome in plan.domes):
+        yield "rays find what moves from anywhere"
     if plan.moments or "MOTION" in plan.inputs:
         yield "what moves is seen at more than one time"
     if any(dome.points for dome in plan.domes):
         yield "a dome is sampled by what the image shows"
     if plan.tracks_error or plan.time_limit is not None or plan.debug or plan.mattes:
         yield "layers or limits concern all of it"
-
-
-def _are_same_bounds(before: Scene, scene: Scene) -> bool:
-    return np.array_equal(before.bounds, scene.bounds)
 
 
 def _light_terms(plan: Plan) -> list[tuple[Any, ...]]:
@@ -116,6 +135,15 @@ def _boxes(scene: Scene, rows: NDArray[np.int64]) -> NDArray[np.float64]:
         return np.empty((0, 2, 3))
     bounds = np.array([mesh.bounds for mesh in scene.meshes])[_mesh_numbers(scene)[rows]]
     return world_boxes(bounds, np.concatenate([d.world_from_object for d in scene.drawables])[rows])
+
+
+def _radii(scene: Scene, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(N,) of balls about the middles of those boxes, world space."""
+    numbers = _mesh_numbers(scene)[rows]
+    known = {number: scene.meshes[number].radius for number in np.unique(numbers).tolist()}
+    linear = np.concatenate([d.world_from_object for d in scene.drawables])[rows, :3, :3]
+    radii = np.array([known[number] for number in numbers.tolist()])
+    return radii * np.linalg.norm(linear, ord=2, axis=(1, 2))
 
 
 def _same(old: Any, new: Any) -> bool:

@@ -92,6 +92,13 @@ class Camera:
         left, right, bottom, top = self.window
         return (right - left) / (top - bottom)
 
+    @property
+    def lens_radius(self) -> float:
+        """Scene units; zero for a pinhole, an orthographic camera, or one without a focus distance."""
+        if self.f_stop <= 0.0 or self.focus_distance <= 0.0 or self.projection != "perspective":
+            return 0.0
+        return 0.5 * self.focal_length / self.f_stop
+
     def conformed(self, aspect: float, policy: ConformPolicy = "expandAperture") -> Camera:
         """This camera with its window fitted to an image of `aspect`."""
         return replace(self, window=conform_window(self.window, aspect, policy))

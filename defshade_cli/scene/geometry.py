@@ -67,6 +67,12 @@ class Mesh:
             return np.array([[np.inf] * 3, [-np.inf] * 3])
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
+    @cached_property
+    def radius(self) -> float:
+        """Of a ball around the drawn points, whose middle is that of `bounds`."""
+        apart = self.points[self.triangles.ravel()].astype(np.float64) - self.bounds.mean(axis=0)
+        return float(np.nanmax(np.linalg.norm(apart[np.isfinite(apart).all(axis=1)], axis=1), initial=0.0))
+
 
 _CORNERS = np.array(list(product((0, 1), repeat=3)))
 """(8, 3) which end of a box each of its corners has along each axis."""
