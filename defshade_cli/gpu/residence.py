@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -70,10 +70,9 @@ class RecordBuffer:
         if self._gpu.is_software and self._turn == 0:
             self._gpu.context.finish()
         buffer, self._turn = self._buffers[self._turn], (self._turn + 1) % len(self._buffers)
-        data = np.ascontiguousarray(records).tobytes()
-        if len(data) > buffer.size:
-            buffer.orphan(len(data))
-        buffer.write(data)
+        if records.nbytes > buffer.size:
+            buffer.orphan(records.nbytes)
+        buffer.write(np.ascontiguousarray(records))
         bind = buffer.bind_to_uniform_block if self._uniform else buffer.bind_to_storage_buffer
         bind(self._binding)
 
@@ -197,7 +196,7 @@ class GpuScene:
             self._tiles.write(textures.tiles)
         return textures
 
-    def _overwrite(self, meshes: tuple[Mesh, ...], arrays_of: Callable[[int], Sequence[NDArray[Any]]]) -> None:
+    def _overwrite(self, meshes: tuple[Mesh, ...], arrays_of: Callable[[int], Iterable[NDArray[Any]]]) -> None:
         """Upload the meshes that are not the same as before, each to its place in the pool."""
         firsts = _first_rows(meshes)
         for number, (old, new) in enumerate(zip(self._meshes, meshes, strict=True)):
@@ -206,10 +205,10 @@ class GpuScene:
                     row = firsts[number, 1 if kind == INDICES_IN_POOL else 0]
                     buffer.write(np.ascontiguousarray(array), offset=int(row) * array[:1].nbytes)
 
-    def _replaced(self, old: list[moderngl.Buffer], arrays: Sequence[NDArray[Any]]) -> list[moderngl.Buffer]:
+    def _replaced(self, old: list[moderngl.Buffer], arrays: Iterable[NDArray[Any]]) -> list[moderngl.Buffer]:
         for buffer in old:
             buffer.release()
-        return [self._gpu.context.buffer(np.ascontiguousarray(a).tobytes() or bytes(4)) for a in arrays]
+        return [self._gpu.context.buffer(np.ascontiguousarray(a) if a.size else bytes(4)) for a in arrays]
 
 
 def instance_records(drawables: Sequence[Drawable], eye: NDArray[np.float64]) -> NDArray[Any]:

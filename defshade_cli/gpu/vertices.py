@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -65,23 +65,23 @@ def vertex_arrays(
     textured: bool,
     layer_uv: bool = False,
     primvars: Sequence[str] = (),
-) -> list[NDArray[Any]]:
-    """Positions (V, 3), normals (V, 3), indices (T, 3); colours (V, 3) and coordinates (V, 2) where asked for."""
-    arrays = [
-        _joined([m.points for m in meshes], 3),
-        _joined([m.normals for m in meshes], 3),
-        _joined([m.triangles for m in meshes], 3, np.uint32),
-    ]
+) -> Iterator[NDArray[Any]]:
+    """Positions (V, 3), normals (V, 3), indices (T, 3); colours (V, 3) and coordinates (V, 2) where asked for.
+
+    One after another, so that few are held at a time.
+    """
+    yield _joined([m.points for m in meshes], 3)
+    yield _joined([m.normals for m in meshes], 3)
+    yield _joined([m.triangles for m in meshes], 3, np.uint32)
     if color_varies:
-        arrays.append(_joined([_vertex_colors(m) for m in meshes], 4))
+        yield _joined([_vertex_colors(m) for m in meshes], 4)
     if textured:
         width = 2 * max(map(len, uvs), default=0)
-        arrays.append(_joined([_vertex_uvs(m, names) for m, names in zip(meshes, uvs, strict=True)], width))
+        yield _joined([_vertex_uvs(m, names) for m, names in zip(meshes, uvs, strict=True)], width)
     if layer_uv:
-        arrays.append(_joined([_layer_uvs(m) for m in meshes], 2))
+        yield _joined([_layer_uvs(m) for m in meshes], 2)
     if primvars:
-        arrays.append(_joined([_vertex_primvars(m, primvars) for m in meshes], 4 * MOST_PRIMVARS))
-    return arrays
+        yield _joined([_vertex_primvars(m, primvars) for m in meshes], 4 * MOST_PRIMVARS)
 
 
 def _joined(arrays: Sequence[NDArray[Any]], width: int, dtype: type = np.float32) -> NDArray[Any]:
