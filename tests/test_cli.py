@@ -209,6 +209,16 @@ def test_a_bug_keeps_its_traceback() -> None:
         defshade_here("render", "stages/triangle.usda")
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no device that is always full")
+@pytest.mark.parametrize("arguments", [["--version"], ["inspect", "stages/triangle.usda"]])
+def test_results_that_nobody_can_take_are_an_error(folder: Path, arguments: list[str]) -> None:
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "defshade_cli.cli", *arguments]
+        ended = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert ended.returncode == 5
+    assert ended.stderr.startswith("defshade: error: ") and ended.stderr.count("\n") == 1
+
+
 def test_unknown_display_is_refused(folder: Path) -> None:
     done = defshade("render", "stages/triangle.usda", *SMALL, "-o", "out.png", "--display", "Radio")
     assert_refused(done, 2, "Radio")

@@ -22,7 +22,7 @@ from importlib import import_module
 import click
 
 from defshade_cli import __version__
-from defshade_cli.errors import DefshadeError, UsageError
+from defshade_cli.errors import DefshadeError, OutputError, UsageError
 
 INTERRUPTED = 130  # 128 + SIGINT, as shells have it
 
@@ -88,12 +88,17 @@ def main() -> None:
     _spare_the_processor()
     try:
         status = defshade.main(prog_name="defshade", standalone_mode=False)
+        sys.stdout.flush()
     except click.Abort:
         _leave("interrupted", INTERRUPTED)
     except click.ClickException as error:
         _leave(_sentence(error), error.exit_code)
     except DefshadeError as error:
         _leave(str(error), error.exit_code)
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        _leave(f"what is told cannot be written: {error.strerror}", OutputError.exit_code)
     sys.exit(status)
 
 
