@@ -16,6 +16,7 @@ from defshade_cli.settings import RenderJob, RenderSettings
 from stages import move
 
 CAMERA = f"""def Camera "camera" {{
+    double shutter:close = 0.5
     float focalLength = 30
     {move(y=2, z=12)}
 }}
@@ -113,11 +114,12 @@ def drawn(job: RenderJob, renderer: Renderer) -> tuple[list[Film], list[str]]:
         (BALL, {"layout": "packed", "lighting": "tiles"}),
         (GLASS, {"samples": 3, "layers": ("beauty", "diffuse", "light:bulb")}),
         (INSTANCES, {"layers": DATA}),
+        (BALL, {"layers": ("motionForward", "motionBackward")}),
         (BALL, {"shadows": True, "layers": ("beauty", "shadow")}),
         (BALL, {"shadows": True, "samples": 3, "lighting": "volumes"}),
         (GLASS, {"shadows": True, "samples": 2, "lighting": "tiles"}),
     ],
-    ids=["plain", "data", "volumes", "tiles", "glass", "instances", "shadows", "soft", "thin"],
+    ids=["plain", "data", "volumes", "tiles", "glass", "instances", "motion", "shadows", "soft", "thin"],
 )
 def test_a_part_is_drawn_and_the_picture_is_equal(
     moving: str, settings: dict[str, Any], tmp_path: Path, renderer: Renderer
@@ -137,7 +139,7 @@ def test_a_part_is_drawn_and_the_picture_is_equal(
     [
         (TURNED + FLOOR + BALL, {}),
         (SUN + FLOOR.replace("(3, 3, 0)", "(3, -9, 0)") + BALL, {"shadows": True}),
-        (SUN + BULB + FLOOR + BALL, {"layers": ("beauty", "motionForward")}),
+        (SUN + BULB + FLOOR + BALL, {"samples": 2, "motion_blur": True, "layers": ("beauty",)}),
         (SUN + BULB + FLOOR + BALL, {"layers": ("beauty", "cryptoObject")}),
         (SUN + BULB + FLOOR + BALL, {"samples": 2, "max_error": 0.5}),
         (DOME + FLOOR + BALL, {"samples": 2}),

@@ -76,7 +76,8 @@ def _shadowed(
 
 def _reasons(before: Scene, planned: Plan, scene: Scene, plan: Plan) -> Iterator[str]:
     """Why all of the image may look otherwise, as far as there are reasons."""
-    if not (_are_equal(before.camera, scene.camera) and _are_equal(planned.camera, plan.camera)):
+    cameras = [(one.camera, *(moment.camera for moment in one.neighbours)) for one in (before, scene)]
+    if len(cameras[0]) != len(cameras[1]) or not all(map(_are_equal, *cameras)):
         yield "the camera moves"
     if any(not _same(getattr(before, name), getattr(scene, name)) for name in _OF_THE_SCENE):
         yield "lights or materials change"
@@ -90,7 +91,7 @@ def _reasons(before: Scene, planned: Plan, scene: Scene, plan: Plan) -> Iterator
         yield "lights are fitted to other bounds"
     if plan.shadows_lamps or any(plan.shadows_sky(dome) for dome in plan.domes):
         yield "rays find what moves from anywhere"
-    if plan.moments or "MOTION" in plan.inputs:
+    if plan.moments:
         yield "what moves is seen at more than one time"
     if any(dome.points for dome in plan.domes):
         yield "a dome is sampled by what the image shows"
@@ -104,7 +105,7 @@ def _light_terms(plan: Plan) -> list[tuple[Any, ...]]:
 
 
 def _changed_rows(before: Scene, scene: Scene) -> NDArray[np.int64] | None:
-    """Which instances, counted through all drawables, look otherwise; None where they are others."""
+    """Which instances, counted through all drawables, look or move otherwise; None where they are others."""
     pairs = list(zip(before.drawables, scene.drawables, strict=False))
     if len(before.drawables) != len(scene.drawables) or len(before.meshes) != len(scene.meshes):
         return None
@@ -115,6 +116,10 @@ def _changed_rows(before: Scene, scene: Scene) -> NDArray[np.int64] | None:
     for name in _BY_INSTANCE if pairs else ():
         old, new = (np.concatenate([getattr(d, name) for d in s.drawables]) for s in (before, scene))
         changed = changed | (old != new).reshape(len(changed), -1).any(axis=1)
+    for then, now in zip(before.neighbours, scene.neighbours, strict=True) if pairs else ():
+        others = np.array([old is not new for old, new in zip(then.points, now.points, strict=True)], bool)
+        changed = changed | others[_mesh_numbers(scene)]
+        changed |= (np.concatenate(then.placements) != np.concatenate(now.placements)).any(axis=(1, 2))
     return np.flatnonzero(changed)
 
 
