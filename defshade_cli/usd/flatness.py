@@ -45,14 +45,14 @@ def _each_once(measured: Measure) -> Callable[[Sequence[Polygons]], list[float]]
 
 @_each_once
 def mean_edges(row: Row) -> NDArray[np.float64]:
-    """Root of the mean square of the edges' lengths in object units; an edge counts once a face."""
+    """(M,) root of the mean square of the edges' lengths in object units; an edge counts once a face."""
     squares = np.add.reduceat(np.square(_edges(row.polygons)).sum(axis=1), row.corners[:-1])
     return np.sqrt(squares / np.diff(row.corners))
 
 
 @_each_once
 def rises(row: Row) -> NDArray[np.float64]:
-    """Of the surfaces over their cages, in object units."""
+    """(M,) of the surfaces over their cages, in object units."""
     if row.polygons.scheme == "bilinear":
         return _quantiles(*_warps(row))
     return _quantiles(_arcs(row.polygons), np.diff(row.corners))

@@ -121,5 +121,5 @@ class Refiner:
 
 
 def only_finite(points: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Those that no face uses may be anything."""
+    """(P, 3), zero where one is not finite: those that no face uses may be anything."""
     return np.where(np.isfinite(points), points, np.float32(0.0))
