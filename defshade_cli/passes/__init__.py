@@ -1,8 +1,23 @@
 """The deferred renderer: (Plan, Scene) → Film.
 
-gbuffer       opaque geometry into the planes of the table in planes.py
-lighting      each light as its volume, blended over what the GBuffer says
-accumulation  samples summed in float32
-readback      planes and sums as named layers in NumPy
-pipeline      the order of the passes; local variables are the edges
+    pipeline        the order of the passes; local variables are the edges
+    frame, screen   the targets of a frame, and which part of it is drawn       changed_tiles   what moved since
+
+A sample:
+
+    sampling, filters, view          where it lies in its pixel, on the lens and in time
+    gbuffer, culling                 opaque geometry into the planes of gpu/planes.py
+    emitters, shadow…, shadows       what stands for each light in it, and the maps seen from there
+    emission, lighting, volumes      what shines by itself; each light as its volume
+    light_tiles, light_lists         many lights, by tiles of the image
+    light_whole                      lights that reach all of it
+    environment, dome…, sky…         skies, and how much of them is open
+    lobe_rays, lamp_records          what lobes mirror, by rays of each pixel's own
+    light_records, light_traits, light_targets, linking, tables   what the shaders read of lights, and draw them into
+
+All of them:
+
+    accumulation, batch_means, convergence, stopping   summed in float32, and whether they are enough
+    readback, identification, motion                   planes and sums as named layers in NumPy
+    display, debug_volumes                             what a display shows; the volumes themselves
 """
