@@ -56,7 +56,7 @@ def _rectangles(boxes: NDArray[np.float64], plan: Plan) -> NDArray[np.float64]:
     if camera.projection == "perspective":
         ahead = depth.max(axis=1) > 0.0
         seen, depth = seen[ahead], depth[ahead]
-        scale = np.maximum(depth, np.finfo(float).tiny)
+        scale = np.maximum(depth, 1e-30)
     pixels = np.array([width / (right - left), height / (top - bottom)])
     places = np.stack([seen[..., 0] / scale - left, top - seen[..., 1] / scale], axis=-1) * pixels
     blur = camera.lens_radius * np.abs(1.0 / (camera.focus_distance or np.inf) - 1.0 / scale)
