@@ -15,6 +15,8 @@ from pxr import Sdf, Usd, UsdShade
 PURPOSES = ("full", "preview", "")
 """Of bindings, in order of preference where render settings have none; the empty name is for all purposes."""
 
+_DIRECT = str(UsdShade.Tokens.materialBinding)
+
 
 class Binding(NamedTuple):
     """material: its path, whether or not it exists; stronger: than what is bound further down."""
@@ -75,9 +77,27 @@ def read_bound(stage: Usd.Stage, path: str, above: Bound, said: Collection[str] 
     own = [name for name in said if name.startswith("material:")]
     if not own and not above.by_collection:
         return above
+    prim = stage.GetPrimAtPath(path)
+    if own == [_DIRECT] and not (above.by_collection or above.by_purpose):
+        direct = _direct(prim)
+        if direct:
+            return above._replace(bindings=Bindings(all_purpose=_stronger(direct, above.bindings.all_purpose)))
     by_collection = above.by_collection or any(":collection:" in name for name in own)
     by_purpose = above.by_purpose or any(":full" in name or ":preview" in name for name in own)
-    return Bound(_resolve(stage.GetPrimAtPath(path), by_purpose=by_purpose), by_collection, by_purpose)
+    return Bound(_resolve(prim, by_purpose=by_purpose), by_collection, by_purpose)
+
+
+def _direct(prim: Usd.Prim) -> Binding | None:
+    """The one material that a relationship of the prim's own binds; None where it is for USD to say what holds."""
+    if not prim.HasAPI(UsdShade.MaterialBindingAPI):
+        return None
+    relationship = prim.GetRelationship(_DIRECT)
+    targets = relationship.GetTargets()
+    material = prim.GetStage().GetPrimAtPath(targets[0]) if len(targets) == 1 else None
+    if not material or not material.IsA(UsdShade.Material):
+        return None
+    strength = UsdShade.MaterialBindingAPI.GetMaterialBindingStrength(relationship)
+    return Binding(targets[0], strength == UsdShade.Tokens.strongerThanDescendants)
 
 
 def _resolve(prim: Usd.Prim, *, by_purpose: bool) -> Bindings:

@@ -5,15 +5,15 @@ Each NumPy call takes as long as some thousand numbers in it, so that small mesh
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.usd.polygons import Polygons, Primvar, varying
+from defshade_cli.usd.polygons import Interpolation, Polygons, Primvar, Scheme, varying
 
 T = TypeVar("T")
 
@@ -23,6 +23,34 @@ LARGEST = 1 << 12
 CORNERS_AT_ONCE = 1 << 18
 
 
+class Faceted(Protocol):
+    """Polygons, or what may become some."""
+
+    @property
+    def points(self) -> NDArray[np.float32]:
+        """(P, 3)"""
+
+    @property
+    def counts(self) -> NDArray[np.integer]:
+        """(F,) corners a face."""
+
+    @property
+    def indices(self) -> NDArray[np.integer]:
+        """(C,) into points."""
+
+    @property
+    def faces(self) -> NDArray[np.int32]:
+        """(F,) the authored face that each is part of."""
+
+    @property
+    def scheme(self) -> Scheme:
+        """As in Polygons."""
+
+    @property
+    def left_handed(self) -> bool:
+        """As in Polygons."""
+
+
 class Row(NamedTuple):
     """M meshes as one. points, faces, corners: (M + 1,) where each begins, and where the last one ends."""
 
@@ -30,6 +58,10 @@ class Row(NamedTuple):
     points: NDArray[np.intp]
     faces: NDArray[np.intp]
     corners: NDArray[np.intp]
+
+    def starts(self, interpolation: Interpolation) -> NDArray[np.intp]:
+        """(M + 1,) where each mesh's values of a primvar begin, which is no constant."""
+        return {"uniform": self.faces, "faceVarying": self.corners}.get(interpolation, self.points)
 
 
 def signature(mesh: Polygons) -> Hashable:
@@ -51,26 +83,33 @@ def blocks(items: Sequence[T], corners: Sequence[int], at_once: int = CORNERS_AT
         yield items[first:end]
 
 
-def lay(meshes: Sequence[Polygons], *, bare: bool = False) -> Row:
+def lay(meshes: Sequence[Polygons]) -> Row:
     """One mesh of all, which have one signature, without their holes, and without the colours that all of one has.
 
-    Other constants become values of points.  bare: without what lies on them, which may differ.
+    Other constants become values of points.
     """
-    sizes = [[len(array) for array in arrays] for arrays in _arrays(meshes)]
-    points, faces, corners = (np.cumsum([0, *some], dtype=np.intp) for some in sizes)
-    first = meshes[0]
+    row = lay_bare(meshes)
+    return row._replace(polygons=_dressed(row.polygons, meshes, np.diff(row.points)))
+
+
+def lay_bare(meshes: Sequence[Faceted]) -> Row:
+    """One mesh of all, which have their scheme and handedness in common, without what lies on them, and holes."""
+    points, faces, corners = (
+        np.cumsum([0, *sizes], dtype=np.intp)
+        for sizes in zip(*[(len(mesh.points), len(mesh.counts), len(mesh.indices)) for mesh in meshes], strict=True)
+    )
     whole = Polygons(
         points=np.concatenate([mesh.points for mesh in meshes]),
         counts=np.concatenate([mesh.counts for mesh in meshes]),
-        indices=np.concatenate([mesh.indices for mesh in meshes]) + np.repeat(points[:-1], sizes[2]),
+        indices=np.concatenate([mesh.indices for mesh in meshes]) + np.repeat(points[:-1], np.diff(corners)),
         faces=np.concatenate([mesh.faces for mesh in meshes]),
-        scheme=first.scheme,
-        left_handed=first.left_handed,
+        scheme=meshes[0].scheme,
+        left_handed=meshes[0].left_handed,
     )
-    return Row(whole if bare else _dressed(whole, meshes, sizes[0]), points, faces, corners)
+    return Row(whole, points, faces, corners)
 
 
-def _dressed(whole: Polygons, meshes: Sequence[Polygons], points: Sequence[int]) -> Polygons:
+def _dressed(whole: Polygons, meshes: Sequence[Polygons], points: NDArray[np.intp]) -> Polygons:
     """points: of each mesh."""
     if not meshes[0].primvars:
         return whole
@@ -84,18 +123,12 @@ def _dressed(whole: Polygons, meshes: Sequence[Polygons], points: Sequence[int])
     )
 
 
-def _arrays(meshes: Sequence[Polygons]) -> Iterable[list[NDArray[Any]]]:
-    yield [mesh.points for mesh in meshes]
-    yield [mesh.counts for mesh in meshes]
-    yield [mesh.indices for mesh in meshes]
-
-
-def _all_joined(named: Sequence[Mapping[str, Primvar]], points: Sequence[int]) -> Mapping[str, Primvar]:
+def _all_joined(named: Sequence[Mapping[str, Primvar]], points: NDArray[np.intp]) -> Mapping[str, Primvar]:
     laid = {name: _joined([each[name] for each in named], points) for name in named[0]}
     return {name: primvar for name, primvar in laid.items() if primvar is not None}
 
 
-def _joined(primvars: Sequence[Primvar | None], points: Sequence[int]) -> Primvar | None:
+def _joined(primvars: Sequence[Primvar | None], points: NDArray[np.intp]) -> Primvar | None:
     values = [primvar.values for primvar in primvars if primvar is not None]
     if not values or primvars[0] is None:
         return None

@@ -14,7 +14,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.usd.end_to_end import Row, blocks, lay
+from defshade_cli.usd.end_to_end import Row, blocks, lay_bare
 from defshade_cli.usd.normals import smooth
 from defshade_cli.usd.polygons import Polygons
 
@@ -37,7 +37,7 @@ def _each_once(measured: Measure) -> Callable[[Sequence[Polygons]], list[float]]
                 alike[each.scheme, each.left_handed].append(each)
         for group in alike.values():
             for block in blocks(group, [len(mesh.indices) for mesh in group]):
-                known.update(zip(block, measured(lay(block, bare=True)).tolist(), strict=True))
+                known.update(zip(block, measured(lay_bare(block)).tolist(), strict=True))
         return [known[each] for each in polygons]
 
     return measure

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,12 +112,34 @@ def read_surface(
     """
     issues: list[str] = []
     said = said or said_of(prim)
-    path = said.path
-    polygons, copies, strands = _read_shape(prim, said, time, issues, color, as_cages)
-    if polygons is None:
+    shape = _read_shape(prim, said, time, issues, color, as_cages)
+    if shape is None:
         return None
     if shown:
-        polygons = replace(polygons, shown=read_shown(prim, shown, time, _elements(polygons), issues))
+        read = read_shown(prim, shown, time, _elements(shape.polygons), issues)
+        shape = shape._replace(polygons=replace(shape.polygons, shown=read))
+    return surface_of(prim, said, time, shape, shapes, subsets, issues)
+
+
+class Shape(NamedTuple):
+    """What a prim is before its materials count; copies and strands as in Surface."""
+
+    polygons: Polygons
+    copies: Copies | None = None
+    strands: Strands | None = None
+
+
+def surface_of(
+    prim: Usd.Prim,
+    said: Said,
+    time: Usd.TimeCode,
+    shape: Shape,
+    shapes: Shapes | None,
+    subsets: list[UsdGeom.Subset] | None,
+    issues: list[str],
+) -> Surface:
+    """Of a prim whose shape is known; arguments as of read_surface. issues: what is said of it already."""
+    path, (polygons, copies, strands) = said.path, shape
     display_color, opacity = _constant(polygons.display_color), _constant(polygons.display_opacity)
     if shapes is not None:
         polygons = shapes.shared(polygons.without_constants())
@@ -221,22 +243,19 @@ def _carried(prim: Usd.Prim, color: str, shown: tuple[str, ...]) -> Iterator[Usd
     yield from (p for name, p in found if name in (color, "displayOpacity") or may_be_uvs(p))
 
 
-_Shape: TypeAlias = "tuple[Polygons | None, Copies | None, Strands | None]"
-"""No polygons for a type that is no supported surface; copies and strands as in Surface."""
-
-
 def _read_shape(
     prim: Usd.Prim, said: Said, time: Usd.TimeCode, issues: list[str], color: str, as_cages: bool
-) -> _Shape:
+) -> Shape | None:
+    """None for a type that is no supported surface."""
     solid = read_solid(prim, said, time, issues, color, as_cage=as_cages)
     if solid is not None:
-        return solid, None, None
+        return Shape(solid)
     if said.type_name == "Mesh" or prim.IsA(UsdGeom.Mesh):
-        return read_mesh(prim, said, time, issues, color), None, None
+        return Shape(read_mesh(prim, said, time, issues, color))
     if prim.IsA(UsdGeom.Points):
         from defshade_cli.usd.points import read_points
 
-        return *read_points(UsdGeom.Points(prim), time, issues, color, as_disks=as_cages), None
+        return Shape(*read_points(UsdGeom.Points(prim), time, issues, color, as_disks=as_cages))
     if prim.IsA(UsdGeom.BasisCurves):
         from defshade_cli.usd.curves import read_curves
 
@@ -248,14 +267,14 @@ def _read_shape(
     if prim.IsA(UsdGeom.NurbsPatch):
         from defshade_cli.usd.nurbs import read_patch
 
-        return read_patch(UsdGeom.NurbsPatch(prim), time, issues, color), None, None
-    return None, None, None
+        return Shape(read_patch(UsdGeom.NurbsPatch(prim), time, issues, color))
+    return None
 
 
-def _along(strands: Strands) -> _Shape:
+def _along(strands: Strands) -> Shape:
     from defshade_cli.usd.sweep import swept
 
-    return swept(strands), None, strands
+    return Shape(swept(strands), strands=strands)
 
 
 def _is_double_sided(prim: Usd.Prim, said: Said) -> bool:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from pxr import Sdf, Usd, UsdGeom
 
@@ -14,9 +14,19 @@ from defshade_cli.scene.texture import SeenFrom
 from defshade_cli.usd import draw_mode
 from defshade_cli.usd.binding import NOTHING_ABOVE, Bindings, Bound, read_bound
 from defshade_cli.usd.blame import blamed
-from defshade_cli.usd.geometry import Surface, is_time_varying, move_surface, only_points_vary, read_surface
+from defshade_cli.usd.checked import check_all
+from defshade_cli.usd.geometry import (
+    Shape,
+    Surface,
+    is_time_varying,
+    move_surface,
+    only_points_vary,
+    read_surface,
+    surface_of,
+)
 from defshade_cli.usd.kind import Kinds
 from defshade_cli.usd.material import ReadMaterial, not_understood, read_material
+from defshade_cli.usd.polygons import Polygons
 from defshade_cli.usd.positions import is_carried_by_velocities
 from defshade_cli.usd.primvars import DISPLAY_COLOR
 from defshade_cli.usd.said import Said
@@ -24,9 +34,19 @@ from defshade_cli.usd.shapes import Shapes
 from defshade_cli.usd.sharing import shared
 from defshade_cli.usd.stage import has_clips
 from defshade_cli.usd.subsets import material_subsets
+from defshade_cli.usd.told import Told, told_of
 
 if TYPE_CHECKING:
     from defshade_cli.usd.skel import Rigs
+
+
+class Asked(NamedTuple):
+    """A mesh, and what it says of itself."""
+
+    prim: Usd.Prim
+    said: Said
+    subsets: list[UsdGeom.Subset]
+    told: Told
 
 
 class Memory:
@@ -85,6 +105,29 @@ class Memory:
         self._surfaces[said.path] = time, surface
         return surface
 
+    def ask(self, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Asked | None:
+        """What a mesh says, to be looked into with others; None of one that is known, or to be read by itself."""
+        if said.type_name != "Mesh" or self._extras.primvars or said.path in self._surfaces:
+            return None
+        subsets = material_subsets(prim)
+        told = told_of(prim, said, time, self._color_of(prim, said, subsets, time))
+        return told and Asked(prim, said, subsets, told)
+
+    def check(self, asked: Sequence[Asked]) -> list[Polygons | None]:
+        """Of each mesh what it says; None where some of it is not sound."""
+        return check_all([each.told for each in asked])
+
+    def surface_of(self, asked: Asked, polygons: Polygons | None, time: Usd.TimeCode) -> Surface:
+        """polygons: those of `check`."""
+        prim, said, subsets, _ = asked
+        if polygons is None:
+            surface = self._read_surface(prim, time, said)
+            assert surface is not None
+        else:
+            surface = self._as_shown(surface_of(prim, said, time, Shape(polygons), self._shapes, subsets, []))
+        self._surfaces[said.path] = time, surface
+        return surface
+
     def _at_another_time(self, known: Surface, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Surface | None:
         """Read is no more than varies; what turns out to be equal stays the same object."""
         shown = self._color_primvar(prim, material_subsets(prim), time), self._extras.primvars
@@ -93,11 +136,10 @@ class Memory:
 
     def _read_surface(self, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Surface | None:
         subsets = material_subsets(prim)
-        bound = self._bound(said.path, said.names)
         surface = read_surface(
             prim,
             time,
-            self._color_primvar(prim, subsets, time) if subsets or any(bound.bindings) else DISPLAY_COLOR,
+            self._color_of(prim, said, subsets, time),
             self._extras.primvars,
             self._shapes,
             as_cages=self._as_cages,
@@ -112,6 +154,10 @@ class Memory:
         if key not in self._stand_ins:
             self._stand_ins[key] = self._as_shown(self._models.read(prim, mode))
         return self._stand_ins[key]
+
+    def _color_of(self, prim: Usd.Prim, said: Said, subsets: list[UsdGeom.Subset], time: Usd.TimeCode) -> str:
+        bound = self._bound(said.path, said.names)
+        return self._color_primvar(prim, subsets, time) if subsets or any(bound.bindings) else DISPLAY_COLOR
 
     def _color_primvar(self, prim: Usd.Prim, subsets: Iterable[UsdGeom.Subset], time: Usd.TimeCode) -> str:
         """What stands for displayColor: the primvar that a material bound to the prim reads its colour from."""

@@ -43,11 +43,11 @@ def read_mesh(
     names = said.names
     points = _points(prim, said, time, issues)
     counts, indices = _topology(prim, time, issues) if len(points) else (_NONE, _NONE)
-    sizes = _sizes(counts)
+    sizes = sizes_of(counts)
     is_whole = sizes.corners == len(indices) and _are_drawn(points, indices)
     if not is_whole:
         counts, indices = _complete(counts, indices, issues)
-        sizes = _sizes(counts)
+        sizes = sizes_of(counts)
     scheme = _scheme(prim, issues) if "subdivisionScheme" in names else "catmullClark"
     elements = count_elements(len(counts), len(points), len(indices))
     carried = read_carried(prim, time, elements, issues, color) if said.primvars else NOTHING_CARRIED
@@ -84,7 +84,7 @@ def _topology(prim: Usd.Prim, time: Usd.TimeCode, issues: list[str]) -> tuple[ND
     return counts, indices
 
 
-class _Sizes(NamedTuple):
+class Sizes(NamedTuple):
     """counts, faces: as in Polygons.  corners: of all faces; −1 where one has fewer than three."""
 
     counts: NDArray[np.integer]
@@ -92,22 +92,25 @@ class _Sizes(NamedTuple):
     corners: int
 
 
-def _sizes(counts: NDArray[np.integer]) -> _Sizes:
-    """Of few faces the same arrays wherever they are equal: small meshes have so many quads, or so many triangles."""
+def sizes_of(counts: NDArray[np.integer]) -> Sizes:
+    """Of faces with so many corners each (F,). Of few faces the same arrays wherever they are equal.
+
+    Small meshes have so many quads, or so many triangles.
+    """
     if len(counts) > _FEW_FACES:
         return _added_up(counts)
     return _of_few(counts.dtype, counts.tobytes())
 
 
 @lru_cache(maxsize=1 << 12)
-def _of_few(number: np.dtype[Any], counts: bytes) -> _Sizes:
+def _of_few(number: np.dtype[Any], counts: bytes) -> Sizes:
     return _added_up(np.frombuffer(counts, number))
 
 
-def _added_up(counts: NDArray[np.integer]) -> _Sizes:
+def _added_up(counts: NDArray[np.integer]) -> Sizes:
     is_whole = len(counts) and np.minimum.reduce(counts) >= 3
     corners = int(np.add.reduce(counts, dtype=np.int64)) if is_whole else -1
-    return _Sizes(counts, np.arange(len(counts), dtype=np.int32), corners)
+    return Sizes(counts, np.arange(len(counts), dtype=np.int32), corners)
 
 
 def _are_drawn(points: NDArray[Any], indices: NDArray[Any]) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.spaces import cross
+from defshade_cli.usd.end_to_end import Row
 from defshade_cli.usd.polygons import Polygons, Primvar
 
 _NO_SHAPE = (0.0, 0.0, 1.0)
@@ -16,6 +17,9 @@ _NO_SHAPE = (0.0, 0.0, 1.0)
 
 _OPPOSED = -1e-3
 """Mean cosine between normals and faces below which the two are taken to disagree."""
+
+_UNCLEAR = 1e-6
+"""Of that cosine: sums may differ by so much with the order in which they are taken."""
 
 
 def vector_areas(corners: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -44,6 +48,18 @@ def mend_normals(polygons: Polygons, issues: list[str]) -> Polygons:
         issues.append("the normals oppose the winding, which is reversed")
         polygons = replace(polygons, left_handed=not polygons.left_handed)
     return replace(polygons, normals=normals)
+
+
+def unit_normals(row: Row, normals: Primvar) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Normals of all meshes of a row as mend_normals makes them, and (M,) where nothing else needs to be mended."""
+    found = ~_lost(normals.values)
+    units = _unit(normals.values if found.all() else np.where(found[:, None], normals.values, np.float32(0.0)))
+    along, most = (
+        np.add.reduceat(each, row.faces[:-1])
+        for each in _agreement(row.polygons, Primvar(units, normals.interpolation))
+    )
+    agree = (along > (_OPPOSED + _UNCLEAR) * most) | (most == 0.0)
+    return units, agree & np.logical_and.reduceat(found, row.starts(normals.interpolation)[:-1])
 
 
 def faceted(polygons: Polygons) -> Primvar:
@@ -92,12 +108,17 @@ def _corner_angles(polygons: Polygons) -> NDArray[np.float64]:
 
 def _of_unit_length(polygons: Polygons, normals: Primvar, issues: list[str]) -> Primvar:
     values = normals.values
-    squares = np.einsum("ni,ni->n", values, values, dtype=np.float64)
-    lost = ~((squares > 0.0) & (squares < np.inf))  # NaN is neither
+    lost = _lost(values)
     if lost.any():
         issues.append(f"{lost.sum()} normals have no direction and follow from the shape")
         values = np.where(lost[:, None], _from_shape(polygons, normals), values)
     return Primvar(_unit(values), normals.interpolation)
+
+
+def _lost(vectors: NDArray[Any]) -> NDArray[np.bool_]:
+    """(N,) those that have no direction."""
+    squares = np.einsum("ni,ni->n", vectors, vectors, dtype=np.float64)
+    return ~((squares > 0.0) & (squares < np.inf))  # NaN is neither
 
 
 def _from_shape(polygons: Polygons, like: Primvar) -> NDArray[np.float32]:
@@ -115,13 +136,19 @@ def _from_shape(polygons: Polygons, like: Primvar) -> NDArray[np.float32]:
 
 def _opposed(polygons: Polygons, normals: Primvar) -> bool:
     """Do the normals, on the whole, point away from the outside that the winding gives?"""
+    along, most = _agreement(polygons, normals)
+    return bool(along.sum() < _OPPOSED * most.sum())
+
+
+def _agreement(polygons: Polygons, normals: Primvar) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(F,) the normals of each face's corners along its outside, times twice its area; and as much as that can be."""
     at_corners = polygons.at_corners(normals)
-    along, most = 0.0, 0.0
-    for _, corners in polygons.by_size():
+    along, most = np.empty((2, len(polygons.counts)))
+    for faces, corners in polygons.by_size():
         areas = _rough_areas(polygons.points[polygons.indices[corners]])
-        along += np.einsum("bi,bni->", areas, at_corners[corners], dtype=np.float64)
-        most += corners.shape[1] * np.sqrt(np.einsum("bi,bi->b", areas, areas)).sum(dtype=np.float64)
-    return bool((-along if polygons.left_handed else along) < _OPPOSED * most)
+        along[faces] = np.einsum("bi,bni->b", areas, at_corners[corners], dtype=np.float64)
+        most[faces] = corners.shape[1] * np.sqrt(np.einsum("bi,bi->b", areas, areas))
+    return -along if polygons.left_handed else along, most
 
 
 def _rough_areas(corners: NDArray[np.float32]) -> NDArray[np.floating]:

@@ -11,13 +11,14 @@ from pxr import Usd
 class Said(NamedTuple):
     """path, type_name: of a prim.  names: of the properties authored on it.
 
-    primvars: may any lie on it, its own or an ancestor's?
+    primvars: may any lie on it, its own or an ancestor's?  inherits: may an ancestor's?
     """
 
     path: str
     type_name: str
     names: Collection[str]
     primvars: bool
+    inherits: bool = True
 
 
 def said_of(
@@ -30,4 +31,4 @@ def said_of(
     names = prim.GetPropertyNames() if clipped else prim.GetAuthoredPropertyNames()
     primvars = primvars_above or "\nprimvars:" in "\n" + "\n".join(names)
     type_name = prim.GetTypeName() if type_name is None else type_name
-    return Said(str(prim.GetPath()), type_name, names, primvars)
+    return Said(str(prim.GetPath()), type_name, names, primvars, primvars_above)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.usd.control import Control
-from defshade_cli.usd.end_to_end import CORNERS_AT_ONCE, LARGEST, blocks, lay, signature
+from defshade_cli.usd.end_to_end import CORNERS_AT_ONCE, LARGEST, blocks, lay_bare, signature
 from defshade_cli.usd.polygons import Interpolation, Polygons, Primvar
 from defshade_cli.usd.refiner import only_finite, weights_of
 from defshade_cli.usd.subdivision import Topology
@@ -63,7 +63,7 @@ def _cut_open(cages: Sequence[Cage]) -> Sequence[Hashable]:
     lying = [_end_to_end(cages, number) for number, each in primvars if each.interpolation == "faceVarying"]
     if not lying:
         return [()] * len(cages)
-    row = lay([cage.polygons for cage in cages], bare=True)
+    row = lay_bare([cage.polygons for cage in cages])
     sizes = np.diff(row.corners)
     welded = [weld(row.polygons.indices, values) for values in lying]
     numbers = [number - np.repeat(np.searchsorted(chosen, row.corners[:-1]), sizes) for number, chosen in welded]
@@ -100,7 +100,7 @@ class _Stack:
         first = [column[0] for column in columns]
         self._times, self._level = len(columns[0]), level
         self._cages = [column[number] for number in range(self._times) for column in columns]
-        self._row = lay([cage.polygons for cage in self._cages], bare=True).polygons
+        self._row = lay_bare([cage.polygons for cage in self._cages]).polygons
         self._weights = weights_of(_of_all([cage.control for cage in first]), level)
         self._kept = ~self._weights.refinement.holes
         self._kept_corners = np.repeat(self._kept, self._weights.refinement.face_counts)

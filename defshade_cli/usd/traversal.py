@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from heapq import merge
+from operator import itemgetter
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 from pxr import Sdf, Usd, UsdGeom, UsdLux
 
@@ -22,10 +24,11 @@ from defshade_cli.usd.geometry import Surface, is_time_varying
 from defshade_cli.usd.instancing import Piece, Standing, finite, place
 from defshade_cli.usd.kind import Kind, Nature
 from defshade_cli.usd.light import is_light, read_light
-from defshade_cli.usd.memory import Memory
+from defshade_cli.usd.memory import Asked, Memory
 from defshade_cli.usd.mesh_light import Glow
 from defshade_cli.usd.native_instances import NativeInstances
 from defshade_cli.usd.point_instancer import has_varying_copies, read_point_instancer
+from defshade_cli.usd.polygons import Polygons
 from defshade_cli.usd.render_pass import PassRules
 from defshade_cli.usd.said import Said, said_of
 from defshade_cli.usd.values import STANDS_NOWHERE
@@ -39,6 +42,14 @@ _XFORM_OPS = str(UsdGeom.Tokens.xformOpOrder)
 
 _PROTOTYPE_CHILDREN = Usd.PrimIsActive & Usd.PrimIsLoaded
 """Classes and overs count below a PointInstancer's prototype: the schema recommends them to hide it elsewhere."""
+
+
+class _Awaited(NamedTuple):
+    """In place of a piece: a small mesh that is looked into with others. place: of what may be to say among issues."""
+
+    asked: Asked
+    here: Standing
+    place: int
 
 
 class Traversal:
@@ -78,7 +89,7 @@ class Traversal:
         self, roots: Iterable[Usd.Prim], above: Standing, predicate: object = Usd.PrimDefaultPredicate
     ) -> tuple[Piece, ...]:
         """The pieces of the subtree that starts with `roots`."""
-        pieces: list[Piece] = []
+        pieces: list[Piece | _Awaited] = []
         instances = NativeInstances(self._memory)
         stack = [(root, above) for root in reversed(list(roots))]
         while stack:
@@ -90,11 +101,16 @@ class Traversal:
                 continue
             if children:
                 stack.extend([(child, here) for child in reversed(children)])
-        pieces.extend(self._native_instances(instances))
-        return tuple(pieces)
+        arrived = self._arrived(pieces)
+        return (*arrived, *self._native_instances(instances))
 
     def _visit(
-        self, prim: Usd.Prim, above: Standing, predicate: object, pieces: list[Piece], instances: NativeInstances
+        self,
+        prim: Usd.Prim,
+        above: Standing,
+        predicate: object,
+        pieces: list[Piece | _Awaited],
+        instances: NativeInstances,
     ) -> tuple[Sequence[Usd.Prim], Standing]:
         """Put the prim with `pieces` or `instances`. Returns the children to visit, and what they stand in."""
         nature = self._memory.kinds.of(prim)
@@ -152,9 +168,9 @@ class Traversal:
         self.dormant |= visibility.ValueMightBeTimeVarying()
         return False
 
-    def _own_pieces(self, prim: Usd.Prim, kind: Kind, here: Standing, said: Said) -> list[Piece]:
+    def _own_pieces(self, prim: Usd.Prim, kind: Kind, here: Standing, said: Said) -> list[Piece | _Awaited]:
         """What the prim itself is, whatever stands below it: a light, a surface, both or neither."""
-        found: list[Piece | None] = []
+        found: list[Piece | _Awaited | None] = []
         if self._is_hidden(prim):
             return []
         if is_light(prim):
@@ -186,17 +202,55 @@ class Traversal:
             return None
         return None if light is None else self._piece(prim, here, light)
 
-    def _gprim(self, prim: Usd.Prim, here: Standing, said: Said) -> Piece | None:
+    def _gprim(self, prim: Usd.Prim, here: Standing, said: Said) -> Piece | _Awaited | None:
+        asked = self._memory.ask(prim, self._time, said) if self._time == self._base else None
+        if asked:
+            return _Awaited(asked, here, len(self.issues))
         surface = self._memory.surface_around(prim, self._time, self._base, said)
         if surface is None:
             self._report(prim, f"prims of type {prim.GetTypeName()} are not drawn")
             return None
+        piece, issues = self._standing_piece(prim, here, surface)
+        self.issues.update(dict.fromkeys(issues))
+        return piece
+
+    def _standing_piece(
+        self, prim: Usd.Prim, here: Standing, surface: Surface
+    ) -> tuple[Piece, tuple[Unsupported, ...]]:
+        """The surface where it is drawn, and what is to say of it."""
         if surface.groups and here.rig:
             surface, here = self._deformed(prim, surface, here, here.rig)
-        if surface.issues:
-            self.issues.update(dict.fromkeys(surface.issues))
         self.dormant |= not surface.groups and is_time_varying(prim)
-        return self._piece(prim, here, surface, {path: self._memory.bindings(path) for path in surface.groups})
+        bindings = {path: self._memory.bindings(path) for path in surface.groups}
+        return self._piece(prim, here, surface, bindings), surface.issues
+
+    def _arrived(self, pieces: Sequence[Piece | _Awaited]) -> list[Piece]:
+        """The pieces with those that were awaited, whose surfaces are looked into together."""
+        awaited = [piece for piece in pieces if isinstance(piece, _Awaited)]
+        if not awaited:
+            return cast("list[Piece]", pieces)
+        checked = iter(self._memory.check([piece.asked for piece in awaited]))
+        late: list[tuple[int, Unsupported]] = []
+        arrived = (self._arrive(p, next(checked), late) if isinstance(p, _Awaited) else p for p in pieces)
+        found = [piece for piece in arrived if piece]
+        if late:
+            said = merge(late, enumerate(self.issues), key=itemgetter(0))
+            self.issues = dict.fromkeys(issue for _, issue in said)
+        return found
+
+    def _arrive(
+        self, awaited: _Awaited, polygons: Polygons | None, late: list[tuple[int, Unsupported]]
+    ) -> Piece | None:
+        """late: takes what is to say of it, with the place among the issues that it would have had."""
+        asked, here, place = awaited
+        try:
+            piece, issues = self._standing_piece(asked.prim, here, self._memory.surface_of(asked, polygons, self._time))
+        except Exception as error:  # a bug goes on as one
+            path = self._memory.shown(asked.prim.GetPath())
+            late.append((place, Unsupported(path, blamed(error, asked.prim))))
+            return None
+        late.extend([(place, issue) for issue in issues])
+        return piece
 
     def _deformed(self, prim: Usd.Prim, rest: Surface, here: Standing, rig: Rig) -> tuple[Surface, Standing]:
         """The surface as its skeleton bends it, standing where that does."""
