@@ -66,7 +66,8 @@ def find_redrawing(before: Scene, planned: Plan, scene: Scene, plan: Plan) -> Re
 def _shadowed(
     scene: Scene, plan: Plan, moved: NDArray[np.float64], radii: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
-    lights = [planned for planned in plan.lights if plan.shadows and planned.light.casts_shadow]
+    casting = [planned for planned in plan.lights if plan.shadows and planned.light.casts_shadow]
+    lights = [(p.light, p.light.spread if plan.samples * p.points > 1 else 0.0) for p in casting]
     if not (lights and len(moved)):
         return moved[:0]
     left, right, _, _ = plan.camera.window

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.plan.bounds import LightBounds
-from defshade_cli.plan.lights import PlannedLight
 from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.light import Light
 from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import transform_points
 
@@ -26,16 +26,19 @@ _LEAST_ANGLE = 1e-3
 """Of a cone for a light that is far away, radians."""
 
 
+Caster = tuple[Light, float]
+"""A light, and its `spread` as far as it is seen: none of one that is seen as a point."""
+
 Balls = tuple[NDArray[np.float64], NDArray[np.float64]]
 """(N, 3) centres and (N,) radii."""
 
 
 def shadowed_boxes(
-    scene: Scene, lights: Sequence[PlannedLight], resolution: int, moved: Balls, side: float
+    scene: Scene, lights: Sequence[Caster], resolution: int, moved: Balls, side: float
 ) -> NDArray[np.float64] | None:
     """(C, 2, 3) world space; None where they are too many.
 
-    lights: those with shadows.  resolution: texels along the side of a map.  moved: around what casts them.
+    lights: that have shadows.  resolution: texels along the side of a map.  moved: around what casts them.
     side: of what is small enough one unit ahead of the camera, or in scene units without perspective.
     """
     if len(moved[1]) * len(lights) > _MOST_CONES:
@@ -64,14 +67,14 @@ def _joined(balls: Balls) -> Balls:
     return centre[None], np.array([(np.linalg.norm(centres - centre, axis=1) + radii).max(initial=0.0)])
 
 
-def _cones(lights: Sequence[PlannedLight], moved: Balls, resolution: int, around: NDArray[np.float64]) -> LightBounds:
+def _cones(lights: Sequence[Caster], moved: Balls, resolution: int, around: NDArray[np.float64]) -> LightBounds:
     """One for each light and each of the balls. around: (2, 3), all geometry."""
     texels, extent = _TEXELS / resolution, float(np.linalg.norm(around[1] - around[0]))
     cones = [
-        _distant_cone(planned, centre, radius, texels, extent)
-        if planned.light.is_infinite
-        else _near_cone(planned, centre, radius, texels)
-        for planned in lights
+        _distant_cone(light, spread, centre, radius, texels, extent)
+        if light.is_infinite
+        else _near_cone(light, spread, centre, radius, texels)
+        for light, spread in lights
         for centre, radius in zip(moved[0], moved[1].tolist(), strict=True)
     ]
     apex, axis, angle = (np.array(column) for column in zip(*cones, strict=True))
@@ -82,25 +85,24 @@ _Cone = tuple[NDArray[np.float64], NDArray[np.float64], float]
 """Apex, axis, and the angle between axis and mantle."""
 
 
-def _near_cone(planned: PlannedLight, centre: NDArray[np.float64], radius: float, texels: float) -> _Cone:
+def _near_cone(light: Light, spread: float, centre: NDArray[np.float64], radius: float, texels: float) -> _Cone:
     """Behind the light, so that it holds the light and spreads as the rays past both do; no cone where they meet."""
-    light = planned.light
     offset = centre - light.position
     distance = float(np.linalg.norm(offset))
-    both = light.spread + radius + texels * _WIDEST * distance
+    both = spread + radius + texels * _WIDEST * distance
     if both >= 0.9 * distance:
         return light.position, light.axis, math.pi
     axis = offset / distance
-    return light.position - axis * (light.spread * distance / both), axis, math.asin(both / distance)
+    return light.position - axis * (spread * distance / both), axis, math.asin(both / distance)
 
 
 def _distant_cone(
-    planned: PlannedLight, centre: NDArray[np.float64], radius: float, texels: float, extent: float
+    light: Light, spread: float, centre: NDArray[np.float64], radius: float, texels: float, extent: float
 ) -> _Cone:
     """So far behind that it is wide enough wherever geometry, which is `extent` across, is before the ball."""
-    axis, angle = planned.light.axis, max(math.asin(min(planned.light.spread, 1.0)), _LEAST_ANGLE)
+    angle = max(math.asin(min(spread, 1.0)), _LEAST_ANGLE)
     behind = 2.0 * extent + (radius + 1.5 * texels * extent) / math.sin(angle)
-    return centre - axis * behind, axis, angle if angle < math.pi / 3 else math.pi
+    return centre - light.axis * behind, light.axis, angle if angle < math.pi / 3 else math.pi
 
 
 def _meet(cones: LightBounds, boxes: NDArray[np.float64]) -> NDArray[np.bool_]:
