@@ -67,37 +67,46 @@ class Bound(NamedTuple):
 NOTHING_ABOVE = Bound(NOTHING_BOUND, by_collection=False, by_purpose=False)
 
 
-def read_bound(stage: Usd.Stage, path: str, above: Bound, said: Collection[str] | None = None) -> Bound:
+Known = dict[Sdf.Path, tuple[Binding, Binding] | None]
+"""Materials by path: their bindings, weaker and stronger than descendants; None for what is no material."""
+
+
+def read_bound(prim: Usd.Prim, above: Bound, known: Known, said: Collection[str] | None = None) -> Bound:
     """Of a prim whose parent has `above`: the same, unless it has bindings of its own or a collection may hold it.
 
-    said: names of the properties authored on it, where they are known.
+    said: names of the properties authored on it, where they are known.  known: takes what is found.
     """
     if said is None:
-        said = stage.GetPrimAtPath(path).GetAuthoredPropertyNames()
+        said = prim.GetAuthoredPropertyNames()
     own = [name for name in said if name.startswith("material:")]
     if not own and not above.by_collection:
         return above
-    prim = stage.GetPrimAtPath(path)
     if own == [_DIRECT] and not (above.by_collection or above.by_purpose):
-        direct = _direct(prim)
+        direct = _direct(prim, known)
         if direct:
-            return above._replace(bindings=Bindings(all_purpose=_stronger(direct, above.bindings.all_purpose)))
+            bindings = Bindings(all_purpose=_stronger(direct, above.bindings.all_purpose))
+            return Bound(bindings, by_collection=False, by_purpose=False)
     by_collection = above.by_collection or any(":collection:" in name for name in own)
     by_purpose = above.by_purpose or any(":full" in name or ":preview" in name for name in own)
     return Bound(_resolve(prim, by_purpose=by_purpose), by_collection, by_purpose)
 
 
-def _direct(prim: Usd.Prim) -> Binding | None:
+def _direct(prim: Usd.Prim, known: Known) -> Binding | None:
     """The one material that a relationship of the prim's own binds; None where it is for USD to say what holds."""
     if not prim.HasAPI(UsdShade.MaterialBindingAPI):
         return None
     relationship = prim.GetRelationship(_DIRECT)
     targets = relationship.GetTargets()
-    material = prim.GetStage().GetPrimAtPath(targets[0]) if len(targets) == 1 else None
-    if not material or not material.IsA(UsdShade.Material):
+    if len(targets) != 1:
         return None
+    target = targets[0]
+    if target not in known:
+        material = prim.GetStage().GetPrimAtPath(target)
+        is_one = bool(material) and material.IsA(UsdShade.Material)
+        known[target] = (Binding(target, stronger=False), Binding(target, stronger=True)) if is_one else None
+    bindings = known[target]
     strength = UsdShade.MaterialBindingAPI.GetMaterialBindingStrength(relationship)
-    return Binding(targets[0], strength == UsdShade.Tokens.strongerThanDescendants)
+    return bindings and bindings[strength == UsdShade.Tokens.strongerThanDescendants]
 
 
 def _resolve(prim: Usd.Prim, *, by_purpose: bool) -> Bindings:

@@ -12,7 +12,7 @@ from pxr import Sdf, Usd, UsdGeom
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.texture import SeenFrom
 from defshade_cli.usd import draw_mode
-from defshade_cli.usd.binding import NOTHING_ABOVE, Bindings, Bound, read_bound
+from defshade_cli.usd.binding import NOTHING_ABOVE, NOTHING_BOUND, Bindings, Bound, Known, read_bound
 from defshade_cli.usd.blame import blamed
 from defshade_cli.usd.checked import check_all
 from defshade_cli.usd.geometry import (
@@ -75,6 +75,8 @@ class Memory:
         self._time_varying: dict[str, bool] = {}
         self._bindings: dict[str, Bound] = {"/": NOTHING_ABOVE}
         self._materials: dict[Sdf.Path, ReadMaterial] = {}
+        self._bound_directly: Known = {}
+        self._colors: dict[Bindings, str] = {}
         self._first_instances: dict[str, str] = {}
         self._models = draw_mode.StandIns(seen_from)
         self._stand_ins: dict[tuple[Sdf.Path, str], Surface] = {}
@@ -156,8 +158,18 @@ class Memory:
         return self._stand_ins[key]
 
     def _color_of(self, prim: Usd.Prim, said: Said, subsets: list[UsdGeom.Subset], time: Usd.TimeCode) -> str:
-        bound = self._bound(said.path, said.names)
-        return self._color_primvar(prim, subsets, time) if subsets or any(bound.bindings) else DISPLAY_COLOR
+        """As _color_primvar; what follows from bindings alone is found once for all prims with the same."""
+        bindings = self._bound(said.path, prim, said.names).bindings
+        if subsets:
+            return self._color_primvar(prim, subsets, time)
+        if bindings == NOTHING_BOUND:
+            return DISPLAY_COLOR
+        color = self._colors.get(bindings)
+        if color is None:
+            color = self._color_primvar(prim, subsets, time)
+            if all(path in self._materials for path in bindings.candidates):
+                self._colors[bindings] = color
+        return color
 
     def _color_primvar(self, prim: Usd.Prim, subsets: Iterable[UsdGeom.Subset], time: Usd.TimeCode) -> str:
         """What stands for displayColor: the primvar that a material bound to the prim reads its colour from."""
@@ -188,15 +200,19 @@ class Memory:
         """Relationships do not vary over time."""
         return self._bound(str(path)).bindings
 
-    def _bound(self, path: str, said: Collection[str] | None = None) -> Bound:
-        """From the nearest prim above whose bindings are known, downwards. said: of the prim, where it is known."""
-        unknown = []
-        while path not in self._bindings:
-            unknown.append(path)
-            path = path.rpartition("/")[0] or "/"
-        bound = self._bindings[path]
-        for below in reversed(unknown):
-            self._bindings[below] = bound = read_bound(self._stage, below, bound, said if below == unknown[0] else None)
+    def _bound(self, path: str, prim: Usd.Prim | None = None, said: Collection[str] | None = None) -> Bound:
+        """From the nearest prim above whose bindings are known, downwards. prim, said: of the path, where known."""
+        known = self._bindings.get(path)
+        if known is not None:
+            return known
+        above: list[str] = []
+        while (parent := (above[-1] if above else path).rpartition("/")[0] or "/") not in self._bindings:
+            above.append(parent)
+        bound = self._bindings[parent]
+        for each in reversed(above):
+            bound = self._bindings[each] = read_bound(self._stage.GetPrimAtPath(each), bound, self._bound_directly)
+        prim = prim or self._stage.GetPrimAtPath(path)
+        bound = self._bindings[path] = read_bound(prim, bound, self._bound_directly, said)
         return bound
 
     def shown(self, path: Sdf.Path | str) -> str:

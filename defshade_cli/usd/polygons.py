@@ -175,12 +175,12 @@ class Polygons:
         """Equal for polygons that are equal in everything: of few corners their bytes, else a hash of these."""
         arrays = [self.points, self.counts, self.indices, self.faces, self.holes]
         said: list[Hashable] = [self.scheme, self.left_handed, *self.uvs, 0, *self.shown]
-        if self.primvars:
-            named = (self.normals, self.display_color, self.display_opacity, *self.uvs.values(), *self.shown.values())
+        named = (self.normals, self.display_color, self.display_opacity, *self.uvs.values(), *self.shown.values())
+        if named != (None, None, None):
             said += [primvar and primvar.interpolation for primvar in named]
             arrays += [primvar.values for primvar in named if primvar]
-        for array in arrays:
-            said += array.dtype.char, array.shape
+        said += [array.dtype.char for array in arrays]
+        said += [array.shape for array in arrays]
         if len(self.indices) <= _FEW_CORNERS:
             return tuple(said), b"".join([array.tobytes() for array in arrays])
         found = blake2b(digest_size=16)

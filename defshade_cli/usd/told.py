@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom, Vt
 
-from defshade_cli.usd.color_space import in_rec709, is_color
+from defshade_cli.usd.color_space import in_rec709
 from defshade_cli.usd.end_to_end import LARGEST
 from defshade_cli.usd.mesh import sizes_of
 from defshade_cli.usd.polygons import SCHEMES, Interpolation, Primvar, Scheme
@@ -23,10 +23,15 @@ _RARE = frozenset({"velocities", "holeIndices", "primvars:normals:indices"})
 _TYPES = Sdf.ValueTypeNames
 _UVS = frozenset({_TYPES.TexCoord2fArray, _TYPES.Float2Array})
 _NORMALS = frozenset({_TYPES.Normal3fArray, _TYPES.Float3Array, _TYPES.Vector3fArray})
-_COMMON = _UVS | frozenset(
-    {_TYPES.IntArray, _TYPES.Float3Array, _TYPES.FloatArray, _TYPES.Color3fArray, _TYPES.Normal3fArray}
-    | {_TYPES.Color4fArray, _TYPES.Float4Array, _TYPES.StringArray, _TYPES.TokenArray, _TYPES.String, _TYPES.Token}
-    | {_TYPES.Float, _TYPES.Int, _TYPES.Bool, _TYPES.Matrix4d, _TYPES.Vector3fArray, _TYPES.Point3fArray}
+_COLORS = frozenset({_TYPES.Color3fArray, _TYPES.Color4fArray})
+_COMMON = (
+    _UVS
+    | _COLORS
+    | frozenset(
+        {_TYPES.IntArray, _TYPES.Float3Array, _TYPES.FloatArray, _TYPES.Normal3fArray}
+        | {_TYPES.Float4Array, _TYPES.StringArray, _TYPES.TokenArray, _TYPES.String, _TYPES.Token}
+        | {_TYPES.Float, _TYPES.Int, _TYPES.Bool, _TYPES.Matrix4d, _TYPES.Vector3fArray, _TYPES.Point3fArray}
+    )
 )
 """Of primvars; all but the first two are no texture coordinates."""
 
@@ -117,25 +122,29 @@ def _carried(prim: Usd.Prim, said: Said, time: Usd.TimeCode, color: str) -> tupl
         if not name.startswith(_PRIMVARS) or name.endswith(_INDICES) or name == "primvars:normals":
             continue
         attribute = prim.GetAttribute(name)
-        if not attribute or (type_name := attribute.GetTypeName()) not in _COMMON:
+        value = attribute.Get(time) if attribute else None
+        type_name = None if isinstance(value, Vt.Vec2fArray) else attribute and attribute.GetTypeName()
+        if type_name is not None and type_name not in _COMMON:
             return None
         field, expected = _read_as(name[len(_PRIMVARS) :], type_name, color)
         if not expected:
             continue
-        value = attribute.Get(time)
         indices = prim.GetAttribute(name + _INDICES).Get(time) if name + _INDICES in said.names else _NO_INDICES
         if not isinstance(value, expected) or not value or not isinstance(indices, Vt.IntArray):
             return None
-        colors = in_rec709(attribute, value) if is_color(attribute) else value
+        colors = in_rec709(attribute, value) if type_name in _COLORS else value
         interpolation = attribute.GetMetadata("interpolation") or UsdGeom.Tokens.constant
         chosen = None if indices is _NO_INDICES else np.asarray(indices)
         found.append(Lying(field, name[len(_PRIMVARS) :], np.asarray(colors), interpolation, chosen))
     return tuple(found)
 
 
-def _read_as(name: str, type_name: Sdf.ValueTypeName, color: str) -> tuple[Any, type | None]:
-    """The field that a primvar fills, and what its values should be; None of one that is not read."""
-    if type_name in _UVS:
+def _read_as(name: str, type_name: Sdf.ValueTypeName | None, color: str) -> tuple[Any, type | None]:
+    """The field that a primvar fills, and what its values should be; None of one that is not read.
+
+    type_name: None of pairs of floats, which are texture coordinates whatever they are called.
+    """
+    if type_name is None or type_name in _UVS:
         return "uvs", Vt.Vec2fArray
     if name == color:
         return "display_color", Vt.Vec3fArray
