@@ -61,10 +61,11 @@ class Control:
 
     def triangle_count(self, level: int) -> int:
         """Triangles at `level`, holes counted: every face becomes four, but for a first split into quads."""
-        counts, topology = self.topology.face_counts, self.topology
+        topology = self.topology
+        faces, corners = len(topology.face_counts), len(topology.face_indices)
         if level == 0 or topology.scheme == "loop":
-            return int((counts - 2).sum(dtype=np.int64)) * 4**level
-        return int(counts.sum(dtype=np.int64)) * 2 * 4 ** (level - 1)
+            return (corners - 2 * faces) * 4**level
+        return corners * 2 * 4 ** (level - 1)
 
 
 def read_control(

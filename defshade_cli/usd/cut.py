@@ -51,11 +51,17 @@ class Cut(NamedTuple):
 
 
 def cut(
-    polygons: Polygons, faces: Faces, path: str, shaped: Shaped | None = None, *, double_sided: bool = False
+    polygons: Polygons,
+    faces: Faces,
+    path: str,
+    shaped: Shaped | None = None,
+    *,
+    double_sided: bool = False,
+    level: int | None = None,
 ) -> Cut:
     """Triangles over the points, or over the corners where something on the mesh splits points.
 
-    polygons: with normals, unless `shaped` is known of them.
+    polygons: with normals, unless `shaped` is known of them.  double_sided, level: see scene.Mesh.
     """
     issues: list[str] = []
     if shaped:
@@ -63,4 +69,5 @@ def cut(
     else:
         whole = polygons.without_holes().joined()
         drawn = vertices_of(whole, triangulate(whole, issues))
-    return Cut(polygons, faces, drawn.split, *faces.sort(drawn.mesh(path, double_sided=double_sided)), tuple(issues))
+    mesh = drawn.mesh(path, double_sided=double_sided, level=level)
+    return Cut(polygons, faces, drawn.split, *faces.sort(mesh), tuple(issues))

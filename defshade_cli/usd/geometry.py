@@ -185,12 +185,12 @@ def tessellate(
     else:
         refined = with_normals(refiner.refine(surface.polygons) if refiner else surface.polygons)
     polygons = shared(refined, last.cut.polygons) if last else refined
+    sides, refined_to = surface.double_sided, (refiner.level if refiner else level) if surface.control else None
     known = last.cut.moved(polygons, surface.faces) if last else None
-    made = known or cut(polygons, surface.faces, surface.path, shaped, double_sided=surface.double_sided)
-    refined_to = (refiner.level if refiner else level) if surface.control else None
+    made = known or cut(polygons, surface.faces, surface.path, shaped, double_sided=sides, level=refined_to)
     mesh = made.mesh
-    if (mesh.double_sided, mesh.level) != (surface.double_sided, refined_to):
-        mesh = replace(mesh, double_sided=surface.double_sided, level=refined_to)
+    if (mesh.double_sided, mesh.level) != (sides, refined_to):
+        mesh = replace(mesh, double_sided=sides, level=refined_to)
     return Gprim(mesh, made.groups, tuple([Unsupported(surface.path, issue) for issue in made.issues]), made)
 
 

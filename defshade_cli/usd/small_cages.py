@@ -138,14 +138,20 @@ class _Stack:
             wiring = self._wirings[place]
             if lost[wiring.points, turn].any():
                 continue
-            surface = replace(
-                cage.polygons,
-                points=points[turn, wiring.points],
-                counts=wiring.counts,
-                indices=wiring.indices,
-                faces=faces[turn, wiring.faces],
-                holes=_NONE,
-                normals=Primvar(shading[turn, wiring.points], "vertex"),
+            own = cage.polygons
+            surface = Polygons(
+                points[turn, wiring.points],
+                wiring.counts,
+                wiring.indices,
+                faces[turn, wiring.faces],
+                _NONE,
+                own.scheme,
+                own.left_handed,
+                Primvar(shading[turn, wiring.points], "vertex"),
+                own.display_color,
+                own.display_opacity,
+                own.uvs,
+                own.shown,
             )
             yield cage, _with(surface, cage, {n: values[turn] for n, values in lying.items()}, wiring)
 

@@ -32,8 +32,8 @@ class Vertices(NamedTuple):
     primvars: Mapping[str, NDArray[np.float32]]
     split: bool
 
-    def mesh(self, path: str, *, double_sided: bool) -> Mesh:
-        """Of the prim at `path`."""
+    def mesh(self, path: str, *, double_sided: bool, level: int | None) -> Mesh:
+        """Of the prim at `path`, refined `level` times."""
         return Mesh(
             path,
             self.points,
@@ -45,6 +45,7 @@ class Vertices(NamedTuple):
             double_sided,
             self.uvs,
             self.primvars,
+            level,
         )
 
     def read_only(self) -> Vertices:
