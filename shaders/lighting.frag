@@ -20,6 +20,6 @@ void main() {
         write_nothing();
         return;
     }
-    float blur = pixel_alpha_squared(surface, pixel);
-    write_light(exposed(lit_by(light, l, irradiance, surface, position, direction_to_eye(position), blur)));
+    see_footprint(surface, pixel);
+    write_light(exposed(lit_by(light, l, irradiance, surface, position, direction_to_eye(position))));
 }

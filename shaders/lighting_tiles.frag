@@ -16,10 +16,10 @@ void main() {
     vec3 position = position_at(gl_FragCoord.xy, camera_depth(stored));
     Surface surface = read_planes(pixel);
     vec3 v = direction_to_eye(position);
-    float blur = pixel_alpha_squared(surface, pixel);
+    see_footprint(surface, pixel);
     Lit total = no_light(run.y);
     for (uint i = run.x; i < run.x + run.y; ++i) {
-        add_light(total, light_of(light_lists[i]), surface, position, v, blur);
+        add_light(total, light_of(light_lists[i]), surface, position, v);
     }
     write_light(exposed(total));
 }

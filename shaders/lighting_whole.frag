@@ -7,7 +7,8 @@ void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec3 position = position_at(gl_FragCoord.xy, camera_depth(texelFetch(plane_depth, pixel, 0).x));
     Surface surface = read_planes(pixel);
+    see_footprint(surface, pixel);
     Lit total = no_light(0u);
-    add_lights(total, surface, position, direction_to_eye(position), pixel_alpha_squared(surface, pixel));
+    add_lights(total, surface, position, direction_to_eye(position));
     write_light(exposed(total));
 }

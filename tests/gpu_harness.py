@@ -38,9 +38,9 @@ void main() {{
     if (i >= uint(probes.length())) return;
     Probe p = probes[i];
     Surface s = Surface(p.normal, p.base, p.metallic, p.roughness, vec3(0.0), p.f0, p.f90,
-                        p.clearcoat, p.clearcoat_roughness, BLUR);
+                        p.clearcoat, p.clearcoat_roughness, BLUR FOOTPRINT);
     vec3 h = normalize(p.view + p.light);
-    float D = D_blurred(GGX_alpha(s.roughness), s.blur, dot(s.normal, h), s.normal, h);
+    float D = D_blurred(GGX_alpha(s.roughness), s.blur, s.normal, h);
     results[i] = vec4(evaluate_brdf(s, p.view, p.light, p.response.xyy), D);
 }}
 """
@@ -55,6 +55,7 @@ class BrdfHarness:
     def __init__(self, gpu: Gpu, shading: Shading, blur: float = 0.0) -> None:
         defines = ["PLANE_CLEARCOAT", f"BLUR {blur:.9f}"]
         defines += ["CLASSIC"] * (shading == "classic") + ["PATCHES"] * (blur > 0)
+        defines += ["FOOTPRINT , POINT" if blur > 0 else "FOOTPRINT"]
         self._context = gpu.context
         self._program = gpu.shaders.compute("brdf_probe.comp", defines, {"brdf_probe.comp": _SOURCE})
 

@@ -26,6 +26,9 @@ from defshade_cli.scene.radiance_map import RadianceMap
 from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import Window
 
+_MIDDLE = 0.0, 0.0, 0.5
+"""Of a ball and of a cone of directions."""
+
 _MOST_BALANCED = 4096
 """Directions of a sky, which are all drawn before the first sample."""
 
@@ -67,6 +70,8 @@ def _emitters(
         places = [sample.on_light(number, k, count) for k in range(count)]
         directions = [sky_emitter(light, sky, u[:2], 1.0 / count, guide, balance) for u in places]
         return [direction.shared_by(plan.samples) for direction in directions]
+    if planned.is_whole:
+        return [emitter_at(light, _MIDDLE if plan.samples == 1 else sample.on_light(number), light.position)]
     if plan.samples * planned.points == 1:
         return [far_field(light)]
     towards = middle_of(extent, plan)

@@ -40,7 +40,7 @@ def light_records(
     aside = np.linalg.norm(places - centres, axis=1)
     columns = {
         "position": places - eye,
-        "axis": [emitter.axis for emitter in emitters],
+        "axis": [(p.light if p.is_whole else e).axis for p, e in zip(lights, emitters, strict=True)],
         "facing": [emitter.facing for emitter in emitters],
         "profile": [_PROFILES.index(emitter.profile) for emitter in emitters],
         "intensity": [emitter.intensity for emitter in emitters],
@@ -49,6 +49,7 @@ def light_records(
         "response": [(planned.light.diffuse, planned.light.specular) for planned in lights],
         "radius": [emitter.radius for emitter in emitters],
         "centre": centres - eye,
+        "is_whole": [planned.is_whole for planned in lights],
         "by_rays": [planned.by_rays for planned in lights],
         "is_sky": [planned.light.kind == "dome" for planned in lights],
         "first_link": [tables.links.lights.get(planned.light, ALL_LINKED) for planned in lights],

@@ -20,7 +20,7 @@ from defshade_cli.passes.light_records import NO_CONE, NO_IES
 Traits = tuple[tuple[str, str], ...]
 """(field of the Light record, its GLSL literal) of each."""
 
-_CHOOSING = ("profile", "shadow_count", "is_sky", "by_rays")
+_CHOOSING = ("profile", "shadow_count", "is_sky", "is_whole", "by_rays")
 """Fields of a few values, each with its own code."""
 
 _UNUSED = {"extent": 0.0, "radius": 0.0, "focus": 0.0, "cone_angle": NO_CONE, "reach": np.inf}
@@ -68,9 +68,9 @@ def written_out_source(each: Sequence[Traits]) -> str:
     """
     body = []
     for number, traits in enumerate(each):
-        added = "    add_light(total, light, surface, position, v, blur);"
+        added = "    add_light(total, light, surface, position, v);"
         body += [f"    light = light_at({number}u);", *_assignments(traits), added]
-    arguments = "inout Lit total, Surface surface, vec3 position, vec3 v, float blur"
+    arguments = "inout Lit total, Surface surface, vec3 position, vec3 v"
     block = block_source("Light", len(each), LIGHT_BLOCK)
     return "\n".join([block, f"void add_lights({arguments}) {{", "    Light light;", *body, "}"])
 

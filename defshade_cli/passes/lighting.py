@@ -67,7 +67,7 @@ class LightingVariant:
         chosen = plan.lights if chosen is None else chosen
         orthographic = plan.camera.projection == "orthographic"
         lights = [planned.light for planned in chosen]
-        patches = plan.pixel_share > 0.0
+        patches = plan.cell_parts > 0
         return cls(
             plan.planes,
             plan.layout,

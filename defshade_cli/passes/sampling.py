@@ -6,6 +6,7 @@ with hashes, so that each pair is stratified at every power of two and the pairs
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -25,12 +26,14 @@ class Sample:
     """One sample: its index, and places in unit squares: its pixel, a shadow map's texel, the lens.
 
     pixel: (0.5, 0.5) is the centre; a wide filter passes the pixel's edges.
+    cell: what the sample stands for of the pixel: from the sample to its middle, and its width and height, in pixels.
     """
 
     index: int
     pixel: Pair
     texel: Pair
     lens: Pair
+    cell: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
 
     @property
     def texel_offset(self) -> Pair:
@@ -52,8 +55,19 @@ def samples(count: int, kind: Filter = "box", width: float = 1.0) -> Iterator[Sa
         yield CENTRE
         return
     for i in range(count):
-        dx, dy = filter_offset(kind, width, owen_sobol(i, _PIXEL))
-        yield Sample(i, (0.5 + dx, 0.5 + dy), owen_sobol(i, _TEXEL), owen_sobol(i, _LENS))
+        place = owen_sobol(i, _PIXEL)
+        dx, dy = filter_offset(kind, width, place)
+        (left, top), (right, bottom) = (filter_offset(kind, width, corner) for corner in _cell(place, count))
+        cell = (0.5 * (left + right) - dx, 0.5 * (top + bottom) - dy, right - left, bottom - top)
+        yield Sample(i, (0.5 + dx, 0.5 + dy), owen_sobol(i, _TEXEL), owen_sobol(i, _LENS), cell)
+
+
+def _cell(place: Pair, count: int) -> tuple[Pair, Pair]:
+    """The corners of the part of the unit square that holds no other of the first 2^k of `count` points."""
+    bits = count.bit_length() - 1
+    columns, rows = 2 ** (bits - bits // 2), 2 ** (bits // 2)
+    x, y = math.floor(place[0] * columns), math.floor(place[1] * rows)
+    return (x / columns, y / rows), ((x + 1) / columns, (y + 1) / rows)
 
 
 def lattice(k: int, count: int) -> Triple:

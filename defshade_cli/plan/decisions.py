@@ -40,7 +40,7 @@ def explain(plan: Plan) -> Iterator[Decision]:
     parts = bool(plan.outputs or plan.groups)
     yield _kept("light in parts", parts, "layers show lobes, groups or shadows", "no layer shows a part of the light")
     plain = "one sample of lights that are points"
-    yield _kept("blur of highlights", plan.pixel_share > 0.0, "over what a sample stands for", plain)
+    yield _kept("blur of highlights", plan.cell_parts > 0, "over what a sample stands for", plain)
     yield _explain_shadows(plan)
     yield _kept("IES profiles", bool(plan.profiles), "a light is shaped by one", "no light has one")
     yield _kept("shadow linking", plan.shadow_linked, "a light chooses its casters", "everything casts shadows")

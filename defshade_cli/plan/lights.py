@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from defshade_cli.image.light_texture import with_texture
 from defshade_cli.plan.groups import group_lights, light_groups, light_outputs
 from defshade_cli.plan.overlap import reaches_into_ball
-from defshade_cli.plan.points import apparent_size, points_of, share_points
+from defshade_cli.plan.points import NEAREST_WHOLE, apparent_size, is_whole, points_of, share_points
 from defshade_cli.scene.light import DistantLight, Light, SphereLight
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
@@ -41,6 +41,7 @@ class PlannedLight:
     reach: radius of the volume in scene units, infinite for a quad.
     is_empty: no geometry lies within a sphere light.
     groups: the layers that sum it.
+    is_whole: it shows as a whole, see plan/points.py.
     points: that stand for the light in each sample; 1 is its far field where there is a single sample.
     by_rays: lobes see it by rays of each pixel's own as well, see plan/lobe_rays.py.
     """
@@ -53,6 +54,7 @@ class PlannedLight:
     groups: tuple[str, ...] = ()
     points: int = 1
     by_rays: bool = False
+    is_whole: bool = False
 
 
 def volume_of(light: Light) -> Volume:
@@ -75,7 +77,8 @@ def plan_lights(
     gain = exposure * response * max(len(lit), 1) / settings.light_tolerance
     order: dict[str, int] = {"quad": 0, "sphere": 1, "cone": 2}
     groups = group_lights([light for _, light in lit], light_groups(layers), light_outputs(layers))
-    points = share_points([apparent_size(light, scene.roomy_bounds) for _, light in lit], settings)
+    sizes = [apparent_size(light, scene.roomy_bounds) for _, light in lit]
+    points = share_points(sizes, settings)
     planned = [
         PlannedLight(
             light=light,
@@ -85,8 +88,9 @@ def plan_lights(
             is_empty=_is_empty(light, scene),
             groups=of_light,
             points=points_of(light, count, settings),
+            is_whole=is_whole(light, count, size, settings) and _is_empty(light, scene, NEAREST_WHOLE),
         )
-        for (number, light), of_light, count in zip(lit, groups, points, strict=True)
+        for (number, light), of_light, count, size in zip(lit, groups, points, sizes, strict=True)
     ]
     return tuple(sorted(planned, key=lambda p: (order[p.volume], p.groups)))
 
@@ -118,7 +122,7 @@ def _reach(light: Light, bounds: NDArray[np.float64], gain: float) -> float:
     return min(math.sqrt(_peak(light) * gain), geometry)
 
 
-def _is_empty(light: Light, scene: Scene) -> bool:
+def _is_empty(light: Light, scene: Scene, radii: float = 1.0) -> bool:
     if not isinstance(light, SphereLight) or light.treat_as_point:
         return True
-    return not reaches_into_ball(scene, light.position, light.world_radius)
+    return not reaches_into_ball(scene, light.position, radii * light.world_radius)

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from defshade_cli.plan.lights import PlannedLight
-from defshade_cli.plan.points import apparent_size
+from defshade_cli.plan.points import LARGE, apparent_size
 from defshade_cli.scene.environment import LUMINANCE
 from defshade_cli.scene.lamp import lamp_of
 from defshade_cli.scene.light import DistantLight, DomeLight, Light
@@ -31,9 +31,6 @@ TRIANGLES_A_SAMPLE = 1 << 16
 
 MOST_LAMPS = 16
 """Each ray looks for each of them; those that light the scene most."""
-
-LARGE = 0.12
-"""Radius over distance of a lamp that rays see in a single sample too, which takes the time of many points of it."""
 
 NARROW = 0.5
 """Alpha of the narrowest lobe, over a lamp's radius over distance: lobes wider than that see it as a point."""
@@ -73,6 +70,7 @@ def _lamps(lights: Iterable[PlannedLight], scene: Scene, settings: RenderSetting
         planned
         for planned in lights
         if planned.points * settings.most_samples > 1
+        and not planned.is_whole
         and apparent_size(planned.light, scene.roomy_bounds) >= least
         and lamp_of(planned.light, np.zeros(3)) is not None
         and _is_plainly_hidden(planned.light, scene, settings, few)

@@ -21,7 +21,7 @@ from defshade_cli.plan.lights import PlannedLight, plan_lights
 from defshade_cli.plan.lobe_rays import roughest_rays, seen_by_rays
 from defshade_cli.plan.moments import count_moments, share_moments
 from defshade_cli.plan.opacity import is_transparent, thin_materials, thin_numbers
-from defshade_cli.plan.points import pixel_share, rays_a_sample
+from defshade_cli.plan.points import cell_parts, rays_a_sample
 from defshade_cli.plan.redrawing import WHOLE, Redrawing, find_redrawing
 from defshade_cli.plan.shadow_maps import count_maps, shadow_resolution
 from defshade_cli.plan.solidity import solid_materials
@@ -52,7 +52,7 @@ class Plan:
     clip: the same with some room, so that it stays from frame to frame.
     render_space: of light and reflectance.
     exposure: linear, the camera's and the settings' together.
-    samples: a pixel at most.  pixel_share: see plan/points.py.  max_error, time_limit: of RenderSettings.
+    samples: a pixel at most.  cell_parts: see plan/points.py.  max_error, time_limit: of RenderSettings.
     filter_width: pixels.
     moments: of the shutter that the samples see, in turn; 0 without motion blur.
     planes: of the GBuffer that samples are lit from; data_planes: of the data layers.
@@ -83,7 +83,7 @@ class Plan:
     layout: Layout
     shading: Shading
     samples: int
-    pixel_share: float
+    cell_parts: int
     max_error: float | None
     time_limit: float | None
     moments: int
@@ -275,7 +275,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         layout=settings.layout,
         shading=settings.shading,
         samples=settings.most_samples,
-        pixel_share=pixel_share(settings),
+        cell_parts=cell_parts(settings),
         max_error=settings.max_error,
         time_limit=settings.time_limit,
         moments=count_moments(scene, settings),

@@ -13,12 +13,21 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.scene.light import DomeLight, Light
+from defshade_cli.scene.light import DistantLight, DomeLight, Light, SphereLight
 from defshade_cli.settings import RenderSettings
+from defshade_cli.spaces import is_similarity
 
-_SMALL, _MIDDLING = 0.03, 0.12
+_SMALL, LARGE = 0.03, 0.12
 """Radius over distance: up to the first one point does, up to the second a quarter of the largest lights' number."""
 
+NEAREST_WHOLE = 6.0
+"""Radii of a light around it in which no geometry lies, where it shows as a whole."""
+
+_FEW_SAMPLES = 64
+"""In which small lights show as a whole; more of them see their points, and rays, to the integral."""
+
+_PARTS = 8
+"""Along a pixel's side, of all cells together: highlights that are smaller are spread over one of them."""
 
 _RAYS_FOR_EACH_POINT = 0.25
 """Of a large light, in all samples together; at least."""
@@ -36,15 +45,26 @@ def points_of(light: Light, shared: int, settings: RenderSettings) -> int:
     return max(_power_of_two(_FOR_EACH_POINT * settings.light_points / settings.most_samples), _SKY_DIRECTIONS)
 
 
-def pixel_share(settings: RenderSettings) -> float:
-    """Of a pixel, what a sample's highlights stand for; 0 for the plain equation.
+def cell_parts(settings: RenderSettings) -> int:
+    """A side of a sample's cell of its pixel, that highlights are looked for in; 0 for the plain equation.
 
-    Half of it for one sample: shares are blurred by twice their variance, which suits strewn samples, not one at the
-    pixel's centre.
+    Fewer as cells become smaller.
     """
     if _is_plain(settings):
-        return 0.0
-    return 1.0 / max(settings.most_samples, 2)
+        return 0
+    return min(max(round(_PARTS / math.sqrt(settings.most_samples)), 1), 4)
+
+
+def is_whole(light: Light, points: int, size: float, settings: RenderSettings) -> bool:
+    """Does it shine from its centre and show in lobes as a whole, its point of each sample casting its shadows alone?
+
+    Round lights that look small, in few samples: their points hardly differ in the diffuse and find few narrow lobes.
+    """
+    if _is_plain(settings) or settings.most_samples > _FEW_SAMPLES or points > 1:
+        return False
+    return 0.0 < size < LARGE and (
+        isinstance(light, DistantLight) or (isinstance(light, SphereLight) and is_similarity(light.world_from_light))
+    )
 
 
 def _is_plain(settings: RenderSettings) -> bool:
@@ -75,7 +95,7 @@ def share_points(sizes: Sequence[float], settings: RenderSettings) -> list[int]:
 def _share(size: float) -> float:
     if size <= _SMALL:
         return 0.0
-    return 0.25 if size <= _MIDDLING else 1.0
+    return 0.25 if size <= LARGE else 1.0
 
 
 def _power_of_two(number: float) -> int:

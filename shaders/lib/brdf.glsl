@@ -18,22 +18,25 @@ float blurred_alpha(float alpha, float blur) {
     return min(sqrt(alpha * alpha + blur), 1.0);
 }
 
-// GGX after a Gaussian that adds `blur` to alpha²: the core widens, the tails stay, which a wider GGX would raise. Over slopes,
-// alpha² / w of it is GGX of w = alpha² + blur and the rest Beckmann of w, each of integral 1.
-float D_blurred(float alpha, float blur, float NoH, vec3 n, vec3 h) {
-    float w = alpha * alpha + blur;
+// GGX as a disc of slopes sees it, whose radius squared is `blur`. Over slopes GGX is the form factor between a patch and a plane
+// parallel to it at a distance of alpha, and this its mean over a disc there (Howell, "A Catalog of Radiation Heat Transfer
+// Configuration Factors", B-13): without its cancellations, and times cos² of the half vector in each length. n of any length.
+float D_blurred(float alpha, float blur, vec3 n, vec3 h) {
     vec3 nxh = cross(n, h);
-    float cos2 = max(NoH * NoH, 1e-3);
-    float beckmann = exp(-dot(nxh, nxh) / (cos2 * w)) / (PI * cos2 * cos2 * w);
-    return mix(beckmann, D_GGX(sqrt(w), NoH, n, h), alpha * alpha / w);
+    float NoH = dot(n, h), cos2 = NoH * NoH, sin2 = dot(nxh, nxh), a2 = alpha * alpha * cos2;
+    float inward = sin2 - blur * cos2, outside = inward + a2;
+    float across = sqrt(inward * inward + a2 * (2.0 * (sin2 + blur * cos2) + a2));
+    float farther = across + abs(outside), squared = sin2 + cos2;
+    float share = outside > 0.0 ? 2.0 * alpha * alpha / farther : farther / (2.0 * blur * cos2 * cos2);
+    return squared * squared * share / (PI * across);
 }
 #else
 float blurred_alpha(float alpha, float blur) {
     return alpha;
 }
 
-float D_blurred(float alpha, float blur, float NoH, vec3 n, vec3 h) {
-    return D_GGX(alpha, NoH, n, h);
+float D_blurred(float alpha, float blur, vec3 n, vec3 h) {
+    return D_GGX(alpha, dot(n, h), n, h);
 }
 #endif
 

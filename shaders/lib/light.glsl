@@ -72,15 +72,14 @@ float ball_solid_angle(float extent, float radius, vec3 to_centre, vec3 l) {
 // Along `l`, that the light's point stands for, seen from a relative position; it depends on the direction alone.
 float patch_solid_angle(Light light, vec3 position, vec3 l) {
     if (light.extent == 0.0 || is_distant(light)) return light.extent;
+    if (light.is_whole != 0u) return light.extent / dot(light.centre - position, light.centre - position);
     if (light.radius > 0.0) return ball_solid_angle(light.extent, light.radius, light.centre - position, l);
     vec3 to_light = light.position - position;
     return light.extent * profile(light, -l) / dot(to_light, to_light);
 }
 
-// How much alpha² grows where a point of the light stands for its whole patch, a disc of solid angle w: half vectors then
-// spread by w / 16π a tangent axis. Points that are strewn evenly err least by twice that variance, and alpha² counts it twice,
-// as in Tokuyoshi & Kaplanyan 2019, "Improved Geometric Specular Antialiasing". Patches shrink with the number of samples, so
-// the mean still converges.
+// The disc of slopes, its radius squared, where a point of the light stands for its whole patch, a disc of solid angle w: half
+// vectors turn by half as much. Patches shrink with the number of samples, so that the mean still converges.
 float patch_alpha_squared(float solid_angle) {
     return solid_angle / (4.0 * PI);
 }
@@ -105,9 +104,10 @@ vec3 irradiance_from(Light light, vec3 position, out vec3 l) {
         l = -light.axis;
         return light.intensity;
     }
-    vec3 to_light = light.position - position;
+    vec3 to_light = (light.is_whole != 0u ? light.centre : light.position) - position;
     float distance_squared = dot(to_light, to_light);
     l = to_light * inversesqrt(distance_squared);
     if (distance_squared >= light.reach * light.reach) return vec3(0.0);
-    return light.intensity * shaped(light, l) * (profile(light, -l) / distance_squared);
+    vec3 from_point = light.is_whole != 0u ? normalize(light.position - position) : l;
+    return light.intensity * shaped(light, from_point) * (profile(light, -l) / distance_squared);
 }

@@ -7,9 +7,10 @@ struct View {
     vec2 depth_coefficients;   // camera depth z: 1 / z (perspective) or z (orthographic) = x * stored + y
     vec2 size;                 // pixels
     vec2 origin;               // of the first pixel in the display window
+    vec4 cell;                 // of its pixel that the sample stands for: its middle from the sample, its size, in pixels, y down
     float exposure;
     uint sample_index;
-    float pixel_share;         // of a pixel, that a sample's highlights stand for; plan/points.py
+    uint cell_parts;           // a side, that highlights are looked for in; plan/points.py
     float sky_share;           // of a dome, that four of its directions stand for
     float lobe_rays;           // of a pixel, in all samples together
     float roughest_rays;       // roughness from which on a surface sends none
@@ -88,6 +89,7 @@ struct Light {
     uint shadow_count;         // 0: casts none
     uint is_sky;               // one of the few directions that stand for a dome
     float extent;              // area that the point stands for; a distant light's solid angle; 0 for a point
+    uint is_whole;             // it shines from its centre and shows in lobes as a whole; the sample's point casts its shadows
     uint by_rays;              // lobes see it by rays of each pixel's own as well
     vec3 right;                // unit, the light's X and Y: what an IES profile's horizontal angle is measured from
     float ies_scale;           // of its candela

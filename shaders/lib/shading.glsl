@@ -13,28 +13,53 @@
 #include "generated/planes.glsl"
 
 #ifdef PATCHES
-float turn_at(Surface s, ivec2 pixel) {
-#ifdef PLANE_WEIGHTS
-    return s.turn;             // the neighbours may show what lies behind
-#else
-    ivec2 inward = ivec2(lessThan(vec2(pixel) * 2.0, view.size)) * 2 - 1;
-    vec3 across = read_planes(pixel + ivec2(inward.x, 0)).normal - s.normal;
-    vec3 along = read_planes(pixel + ivec2(0, inward.y)).normal - s.normal;
-    return turn_of(across, along);
-#endif
+const float SHARP = 0.35;          // roughness: wider lobes hardly vary over a pixel
+const float MOST_TURN = 1.08;      // of a normal over a pixel, squared
+
+// The mean of two changes, or the less where one of them may lead beyond an edge.
+vec3 likely(vec3 one, vec3 other) {
+    float a = dot(one, one), b = dot(other, other);
+    return max(a, b) < 4.0 * min(a, b) ? 0.5 * (one + other) : a < b ? one : other;
 }
 
-// How much alpha² grows where a sample stands for its share of a pixel in which the normal turns: twice the variance of a
-// square of the pixel that is as large, twice as alpha² counts it, and at most 0.18 (Tokuyoshi & Kaplanyan 2019, "Improved
-// Geometric Specular Antialiasing"). Shares shrink with the number of samples, so the mean still converges; without, single
-// samples would hit highlights that are smaller than a pixel.
-float pixel_alpha_squared(Surface s, ivec2 pixel) {
-    if (view.pixel_share == 0.0 || sharpest_roughness(s) > 0.35) return 0.0;
-    return view.pixel_share * min(turn_at(s, pixel) / 6.0, 0.18);
+// How the normal changes from this pixel to the next, by that of its neighbours that is the less likely to lie beyond an edge.
+vec3 turn_along(vec3 normal, ivec2 pixel, ivec2 next) {
+    ivec2 last = ivec2(view.size) - 1;
+    vec3 ahead = read_planes(min(pixel + next, last)).normal - normal;
+    vec3 behind = normal - read_planes(max(pixel - next, ivec2(0))).normal;
+    bool is_first = any(lessThan(pixel - next, ivec2(0))), is_last = any(greaterThan(pixel + next, last));
+    return is_first ? ahead : is_last ? behind : likely(ahead, behind);
+}
+
+// The normals of a sample's cell of its pixel, each of which stands for a disc as wide as its part of it; parts as large as the
+// narrowest lobe do. Cells tile pixels and shrink with the number of samples; a point in each would miss smaller highlights.
+void see_footprint(inout Surface s, ivec2 pixel) {
+    s.footprint = POINT;
+    s.blur = 0.0;
+    float roughness = sharpest_roughness(s);
+#ifdef PLANE_WEIGHTS
+    if (roughness <= SHARP) s.blur = view.cell.z * view.cell.w * min(s.turn, MOST_TURN) / 6.0;    // neighbours may lie behind
+#else
+    // A loop, since a software rasteriser executes what a branch leaves out.
+    for (bool is_sharp = roughness <= SHARP; is_sharp; is_sharp = false) {
+        vec3 x = turn_along(s.normal, pixel, ivec2(1, 0)), y = turn_along(s.normal, pixel, ivec2(0, 1));
+        float most = sqrt(min(1.0, MOST_TURN / max(turn_of(x, y), 1e-12)));
+        x *= most;
+        y *= most;
+        float width = sqrt(turn_of(view.cell.z * x, view.cell.w * y));
+        float alpha = GGX_alpha(roughness);
+        int side = width > alpha ? int(min(ceil(width / alpha), float(view.cell_parts))) : 1;    // 1 for a background's NaN too
+        s.footprint.side = side;
+        s.footprint.across = x * (view.cell.z / float(side));
+        s.footprint.along = y * (view.cell.w / float(side));
+        vec3 middle = view.cell.x * x + view.cell.y * y;
+        s.footprint.first = middle - 0.5 * float(side - 1) * (s.footprint.across + s.footprint.along);
+        s.blur = turn_of(s.footprint.across, s.footprint.along) / 6.0;
+    }
+#endif
 }
 #else
-float pixel_alpha_squared(Surface s, ivec2 pixel) {
-    return 0.0;
+void see_footprint(inout Surface s, ivec2 pixel) {
 }
 #endif
 
@@ -65,8 +90,8 @@ bool is_lit_by(Light light, Surface surface) {
 #endif
 }
 
-// What `irradiance` along `l` adds to a surface seen from `v`, before exposure; blur: of the pixel.
-Lit lit_by(Light light, vec3 l, vec3 irradiance, Surface surface, vec3 position, vec3 v, float blur) {
+// What `irradiance` along `l` adds to a surface seen from `v`, before exposure.
+Lit lit_by(Light light, vec3 l, vec3 irradiance, Surface surface, vec3 position, vec3 v) {
     Lit lit;
     lit.sent = dot(irradiance, vec3(1.0)) * max(dot(surface.normal, l), 0.0);
     lit.volumes = 1.0;
@@ -80,11 +105,12 @@ Lit lit_by(Light light, vec3 l, vec3 irradiance, Surface surface, vec3 position,
     vec3 response = lobe_response(light, surface);
 #ifdef PATCHES
     float solid_angle = patch_solid_angle(light, position, l);
-    surface.blur = blur + patch_alpha_squared(solid_angle);
+    surface.blur += patch_alpha_squared(solid_angle);
 #endif
 #ifdef LOBE_RAYS
     if (light.by_rays != 0u) {
         surface.blur = 0.0;    // a pixel's own rays are strewn as wide as its lobes
+        surface.footprint = POINT;
         response.yz *= share_beside_rays(surface, v, l, solid_angle);
     }
 #endif

@@ -1,5 +1,18 @@
 #include "lib/brdf.glsl"
 
+#ifdef PATCHES
+// The normals of a sample's share of its pixel: `side`² of them in rows, what is added to the middle one for the first and from
+// one to the next.
+struct Footprint {
+    int side;
+    vec3 first;
+    vec3 across;
+    vec3 along;
+};
+const vec3 STILL = vec3(0.0);
+const Footprint POINT = Footprint(1, STILL, STILL, STILL);
+#endif
+
 // What the GBuffer says of one pixel.
 struct Surface {
     vec3 normal;               // unit, facing the camera
@@ -11,7 +24,10 @@ struct Surface {
     vec3 f90;
     float clearcoat;
     float clearcoat_roughness;
-    float blur;                // of lobes, in alpha²: by what one sample stands for
+    float blur;                // of lobes, in slopes squared: the disc that one of the normals below stands for
+#ifdef PATCHES
+    Footprint footprint;
+#endif
 #ifdef PLANE_LINKS
     uint link_set;
 #endif
@@ -69,10 +85,35 @@ Angles angles_between(vec3 n, vec3 v, vec3 l, vec3 h) {
     return Angles(max(dot(n, v), MIN_NOV), dot(n, l), dot(n, h), dot(v, h));
 }
 
-// D G2 / (4 NoL NoV), in the sample's blur.
-float lobe(float alpha, Surface s, Angles a, vec3 h) {
-    float D = D_blurred(alpha, s.blur, a.NoH, s.normal, h);
-    return D * V_SmithGGXCorrelated(a.NoV, a.NoL, blurred_alpha(alpha, s.blur));
+// D of the lobe and of the coat's, at one normal.
+vec2 D_at(Surface s, vec3 n, vec3 h) {
+#ifdef PLANE_CLEARCOAT
+    float coat = D_blurred(GGX_alpha(s.clearcoat_roughness), s.blur, n, h);
+#else
+    float coat = 0.0;
+#endif
+    return vec2(D_blurred(GGX_alpha(s.roughness), s.blur, n, h), coat);
+}
+
+// The same of what a sample stands for. One loop for both: compilers take long for many.
+vec2 D_of(Surface s, vec3 h) {
+#ifdef PATCHES
+    vec3 first = s.normal + s.footprint.first;
+    vec2 sum = D_at(s, first, h);
+    int side = s.footprint.side;
+    for (int i = 1; i < side * side; ++i) {
+        vec3 n = first + float(i % side) * s.footprint.across + float(i / side) * s.footprint.along;
+        sum += D_at(s, n, h);
+    }
+    return sum / float(side * side);
+#else
+    return D_at(s, s.normal, h);
+#endif
+}
+
+// G2 / (4 NoL NoV), in the sample's blur.
+float V_of(float alpha, Surface s, Angles a) {
+    return V_SmithGGXCorrelated(a.NoV, a.NoL, blurred_alpha(alpha, s.blur));
 }
 
 // UsdPreviewSurface as its schema describes it, but that no lobe leaves more light below it than it has not taken:
@@ -83,13 +124,14 @@ vec3 brdf_preview_surface(Surface s, Angles a, vec3 h, vec3 response) {
     float mu = min(a.NoV, a.NoL);
     vec3 taken = max(F, E_bound(s.f0, s.f90, mu, alpha, SMITH_GGX));
     vec3 diffuse = s.base * ((1.0 - s.metallic) / PI) * (1.0 - taken);
-    vec3 specular = lobe(alpha, s, a, h) * F;
+    vec2 D = D_of(s, h);
+    vec3 specular = D.x * V_of(alpha, s, a) * F;
     vec3 result = diffuse * response.x + specular * response.y;
 #ifdef PLANE_CLEARCOAT
     float coat_alpha = GGX_alpha(s.clearcoat_roughness);
     float coat_F = F_Schlick(vec3(DEFAULT_F0), vec3(1.0), a.VoH).x;
     float coat_taken = max(coat_F, E_bound(vec3(DEFAULT_F0), vec3(1.0), mu, coat_alpha, SMITH_GGX).x);
-    float coat = lobe(coat_alpha, s, a, h) * coat_F;
+    float coat = D.y * V_of(coat_alpha, s, a) * coat_F;
     result = result * (1.0 - s.clearcoat * coat_taken) + s.clearcoat * coat * response.z;
 #endif
     return result;
@@ -101,8 +143,7 @@ vec3 brdf_classic(Surface s, Angles a, vec3 h, vec3 response) {
     vec3 real_albedo = s.base - s.base * s.metallic;
     vec3 real_specular = mix(vec3(0.03), s.base, s.metallic);
     vec3 F = F_Schlick(real_specular, vec3(1.0), a.VoH);
-    float D = D_blurred(alpha, s.blur, a.NoH, s.normal, h);
-    vec3 specular = D * V_SmithSchlick(a.NoV, a.NoL, blurred_alpha(alpha, s.blur)) * F;
+    vec3 specular = D_of(s, h).x * V_SmithSchlick(a.NoV, a.NoL, blurred_alpha(alpha, s.blur)) * F;
     vec3 taken = max(specular, E_bound(real_specular, vec3(1.0), min(a.NoV, a.NoL), alpha, SMITH_SCHLICK));
     return real_albedo / PI * max(1.0 - taken, 0.0) * response.x + specular * response.y;
 }
