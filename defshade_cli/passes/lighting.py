@@ -33,7 +33,8 @@ class LightingVariant:
 
     responses: some light shows in one lobe more than in the other.
     shaped: cones, focus or profiles of IES.  profiles: some point does not shine alike all around.
-    patches: points stand for some area of their light, and samples for some of their pixel.
+    cell_parts: a side of the cell of its pixel that a sample stands for, and points stand for some area of their light;
+        0 for the plain equation.
     sky: points of a dome.  lobe_rays: lobes see some light by rays too.
     volumes: the kinds that some light has.  outputs: layers beside the radiance.  groups: those that one light is in.
     """
@@ -48,7 +49,7 @@ class LightingVariant:
     responses: bool
     shaped: bool
     profiles: bool
-    patches: bool
+    cell_parts: int
     sky: bool
     lobe_rays: bool
     volumes: tuple[Volume, ...]
@@ -79,7 +80,7 @@ class LightingVariant:
             any((light.diffuse, light.specular) != (1.0, 1.0) for light in lights),
             any(light.shaping for light in lights),
             patches or any(light.profile != "uniform" for light in lights),
-            patches,
+            plan.cell_parts,
             patches and any(light.kind == "dome" for light in lights),
             any(planned.by_rays for planned in chosen),
             tuple(dict.fromkeys(planned.volume for planned in chosen)),
@@ -100,7 +101,8 @@ class LightingVariant:
             + ["RESPONSES"] * self.responses
             + ["SHAPED"] * self.shaped
             + ["PROFILES"] * self.profiles
-            + ["PATCHES"] * self.patches
+            + ["PATCHES"] * bool(self.cell_parts)
+            + [f"CELL_PARTS {self.cell_parts}"] * (self.cell_parts > 1)
             + ["SKY"] * self.sky
             + ["LOBE_RAYS"] * self.lobe_rays
             + space_defines(self.space)

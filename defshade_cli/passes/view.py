@@ -36,7 +36,7 @@ def view_record(plan: Plan, layout: Layout, sample: Sample = CENTRE) -> NDArray[
     view["sky_share"] = plan.sky_share
     view["lobe_rays"] = plan.lobe_rays * plan.samples
     view["roughest_rays"] = plan.roughest_rays
-    view["cell"], view["cell_parts"] = sample.cell, plan.cell_parts
+    view["cell"] = sample.cell
     return view
 
 

@@ -48,10 +48,12 @@ def points_of(light: Light, shared: int, settings: RenderSettings) -> int:
 def cell_parts(settings: RenderSettings) -> int:
     """A side of a sample's cell of its pixel, that highlights are looked for in; 0 for the plain equation.
 
-    Fewer as cells become smaller.
+    Fewer as cells become smaller; and one where a single sample is asked, which shall be cheap.
     """
     if _is_plain(settings):
         return 0
+    if settings.most_samples == 1:
+        return 1
     return min(max(round(_PARTS / math.sqrt(settings.most_samples)), 1), 4)
 
 

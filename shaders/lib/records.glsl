@@ -10,7 +10,6 @@ struct View {
     vec4 cell;                 // of its pixel that the sample stands for: its middle from the sample, its size, in pixels, y down
     float exposure;
     uint sample_index;
-    uint cell_parts;           // a side, that highlights are looked for in; plan/points.py
     float sky_share;           // of a dome, that four of its directions stand for
     float lobe_rays;           // of a pixel, in all samples together
     float roughest_rays;       // roughness from which on a surface sends none

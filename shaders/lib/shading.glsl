@@ -48,7 +48,10 @@ void see_footprint(inout Surface s, ivec2 pixel) {
         y *= most;
         float width = sqrt(turn_of(view.cell.z * x, view.cell.w * y));
         float alpha = GGX_alpha(roughness);
-        int side = width > alpha ? int(min(ceil(width / alpha), float(view.cell_parts))) : 1;    // 1 for a background's NaN too
+        int side = 1;
+#ifdef CELL_PARTS
+        if (width > alpha) side = int(min(ceil(width / alpha), float(CELL_PARTS)));    // not for a background's NaN
+#endif
         s.footprint.side = side;
         s.footprint.across = x * (view.cell.z / float(side));
         s.footprint.along = y * (view.cell.w / float(side));

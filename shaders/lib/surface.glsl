@@ -100,12 +100,15 @@ vec2 D_of(Surface s, vec3 h) {
 #ifdef PATCHES
     vec3 first = s.normal + s.footprint.first;
     vec2 sum = D_at(s, first, h);
+#ifdef CELL_PARTS
     int side = s.footprint.side;
     for (int i = 1; i < side * side; ++i) {
         vec3 n = first + float(i % side) * s.footprint.across + float(i / side) * s.footprint.along;
         sum += D_at(s, n, h);
     }
-    return sum / float(side * side);
+    sum /= float(side * side);
+#endif
+    return sum;
 #else
     return D_at(s, s.normal, h);
 #endif
