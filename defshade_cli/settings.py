@@ -71,7 +71,7 @@ class Composition:
 
     session_layers: USD files over the stage, the strongest first.
     variants: chosen over them all, in order: a variant may bring the sets that later ones are of.
-    mask: paths of the prims to which the stage is limited, see usd/mask.py; empty for no limit.
+    mask: paths of the prims to which the stage is limited, see usd/opening/mask.py; empty for no limit.
     payloads: whether the stage's payloads are loaded.
     """
 
@@ -215,7 +215,7 @@ class RenderJob:
     frames: USD time codes, None standing for the default time; empty means the stage's first frame, or the frames of
         the turntable, which are 1 and on.
     camera: prim path or name; None picks by the rule in usd/camera.py.
-    render_settings: path of a RenderSettings or RenderPass prim; None finds one as usd/products.py does.
+    render_settings: path of a RenderSettings or RenderPass prim; None finds one by usd/render_settings/products.py.
     product: path or name of a product of theirs; None makes all that the output's names can hold.
     given: names of the RenderSettings that the user chose; the stage may say the others.
     device: EGL device index, None for the driver's default.

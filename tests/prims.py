@@ -11,8 +11,8 @@ from pxr import Sdf, Usd, UsdGeom, UsdUtils, Vt
 
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.scene.scene import Unsupported
-from defshade_cli.usd.geometry import FaceGroup, Gprim, Surface, read_surface, tessellate
-from defshade_cli.usd.refiner import Refiner
+from defshade_cli.usd.polygons.refiner import Refiner
+from defshade_cli.usd.surfaces.geometry import FaceGroup, Gprim, Surface, read_surface, tessellate
 
 DEFAULT = Usd.TimeCode.Default()
 CUBE_POINTS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32)

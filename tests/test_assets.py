@@ -18,8 +18,8 @@ from defshade_cli.image.colour import display_transform
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.settings import RenderSettings
+from defshade_cli.usd.opening.stage import open_stage
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
 
 ROOT = Path(__file__).resolve().parent.parent
 SHEET = ROOT / "build" / "assets.png"

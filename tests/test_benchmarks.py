@@ -38,8 +38,8 @@ def test_many_lights_are_256(stages: ModuleType, tmp_path: Path) -> None:
 
 
 def test_one_prim_of_animated_moves(stages: ModuleType, tmp_path: Path) -> None:
+    from defshade_cli.usd.opening.stage import open_stage
     from defshade_cli.usd.reader import StageReader
-    from defshade_cli.usd.stage import open_stage
 
     reader = StageReader(open_stage(stages.generate(tmp_path, "animated")))
     first, later = reader.read(1), reader.read(26)

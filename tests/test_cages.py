@@ -9,13 +9,13 @@ import pytest
 from pxr import Usd, UsdGeom
 
 import stages
-from defshade_cli.usd.cages import SEGMENTS, capsule_cage, cone_cage, frustum_cage, sphere_cage
-from defshade_cli.usd.control import smooth_control
-from defshade_cli.usd.extent import extents_of, stage_extent
-from defshade_cli.usd.geometry import read_surface
-from defshade_cli.usd.polygons import Polygons
+from defshade_cli.usd.gprims.cages import SEGMENTS, capsule_cage, cone_cage, frustum_cage, sphere_cage
+from defshade_cli.usd.polygons.control import smooth_control
+from defshade_cli.usd.polygons.polygons import Polygons
+from defshade_cli.usd.polygons.refiner import Refiner
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.refiner import Refiner
+from defshade_cli.usd.surfaces.extent import extents_of, stage_extent
+from defshade_cli.usd.surfaces.geometry import read_surface
 from prims import DEFAULT, new_stage
 
 CAGES = {

@@ -11,9 +11,9 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Complexity
-from defshade_cli.usd import tessellation
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.reader import StageReader
+from defshade_cli.usd.surfaces import tessellation
 
 INTERPOLATIONS = ("constant", "uniform", "varying", "vertex", "faceVarying")
 QUADS = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]])

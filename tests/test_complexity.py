@@ -14,10 +14,10 @@ from defshade_cli.plan import make_plan
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.view import View
 from defshade_cli.settings import COMPLEXITIES, RenderSettings
-from defshade_cli.usd import complexity
-from defshade_cli.usd.complexity import EDGE_PIXELS, FINEST_LEVEL, FLAT_PIXELS, choose_levels
-from defshade_cli.usd.flatness import rises
-from defshade_cli.usd.geometry import Surface, read_surface
+from defshade_cli.usd.polygons.flatness import rises
+from defshade_cli.usd.surfaces import complexity
+from defshade_cli.usd.surfaces.complexity import EDGE_PIXELS, FINEST_LEVEL, FLAT_PIXELS, choose_levels
+from defshade_cli.usd.surfaces.geometry import Surface, read_surface
 from prims import define_cube, define_mesh
 from stages import move
 

@@ -18,8 +18,8 @@ from defshade_cli.image.metadata import provenance
 from defshade_cli.rendering import render
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Composition, RenderJob, VariantChoice
+from defshade_cli.usd.opening.stage import open_stage
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
 
 STAGE = """#usda 1.0
 def Xform "car" (

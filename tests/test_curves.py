@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from pxr import UsdGeom, Vt
 from scipy.interpolate import BSpline
 
-from defshade_cli.usd.basis import Kind, sample_curves
-from defshade_cli.usd.geometry import is_time_varying
+from defshade_cli.usd.curves.basis import Kind, sample_curves
+from defshade_cli.usd.surfaces.geometry import is_time_varying
 from prims import Drawn, new_stage, read, reasons, set_primvar
 
 LINE = [(0, 0, 0), (0, 0, 1), (0, 0, 2), (0, 0, 3)]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import stages
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Complexity
-from defshade_cli.usd.strands import fractional_odd
+from defshade_cli.usd.curves.strands import fractional_odd
 from stages import instance, move
 
 CAMERA = """def Camera "eye" {

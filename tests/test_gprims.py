@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom, Vt
 
-from defshade_cli.usd.revolution import SEGMENTS
+from defshade_cli.usd.gprims.revolution import SEGMENTS
 from prims import Drawn, area, corners, is_watertight, new_stage, read, reasons, set_primvar, vector_areas, volume
 
 STEP = 2.0 * math.pi / SEGMENTS

@@ -15,7 +15,7 @@ from pxr import Sdf
 from defshade_cli import render
 from defshade_cli.errors import StageError
 from defshade_cli.measure.layouts import first_frame
-from defshade_cli.usd import instancing
+from defshade_cli.usd.instancing import instancing
 from stages import instance
 
 CAMERA = (

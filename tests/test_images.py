@@ -24,8 +24,8 @@ from defshade_cli.image.reading import read
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan, plan_moments
 from defshade_cli.settings import OutputSettings, RenderSettings
+from defshade_cli.usd.opening.stage import open_stage
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
 
 ROOT = Path(__file__).resolve().parent.parent
 REFERENCES = ROOT / "tests" / "references"

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
-from defshade_cli.usd.binding import NOTHING_BOUND, Bindings
-from defshade_cli.usd.instancing import Piece, Placement, place
+from defshade_cli.usd.instancing.instancing import Piece, Placement, place
+from defshade_cli.usd.materials.binding import NOTHING_BOUND, Bindings
 from defshade_cli.usd.reader import StageReader
 from stages import (
     MATERIALS,

@@ -16,8 +16,8 @@ from defshade_cli.measure.luxtest import ITEMS, Agreement, agreement, sweeps, ta
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.settings import RenderSettings
+from defshade_cli.usd.opening.stage import open_stage
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,8 @@ import pytest
 from defshade_cli.scene.material import UNBOUND, Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.texture import ImageFile, Texture, TextureInput
+from defshade_cli.usd.opening.stage import open_stage
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
 from stages import material_names, reasons, stage_of
 
 BINDS = '(prepend apiSchemas = ["MaterialBindingAPI"])'

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.texture import TextureInput
-from defshade_cli.usd.materialx.models import MODELS
-from defshade_cli.usd.materialx.signal import Lookup, NonLinear, Signal, constant, joined, mixed, texel
+from defshade_cli.usd.materials.materialx.models import MODELS
+from defshade_cli.usd.materials.materialx.signal import Lookup, NonLinear, Signal, constant, joined, mixed, texel
+from defshade_cli.usd.opening.stage import open_stage
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
 
 BINDS = '(prepend apiSchemas = ["MaterialBindingAPI"])'
 STANDARD = "ND_standard_surface_surfaceshader"

@@ -19,7 +19,7 @@ from defshade_cli.scene.material import Material
 from defshade_cli.scene.mesh_light import MeshLight
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderSettings
-from defshade_cli.usd.light import CAMERA_LIGHT
+from defshade_cli.usd.lights.light import CAMERA_LIGHT
 from stages import instance, read, reasons
 
 WHITE = Material("/white", diffuse_color=(1, 1, 1), roughness=1.0, ior=1.0)

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from defshade_cli.scene.scene import Scene
-from defshade_cli.usd.dependencies import read_dependencies
+from defshade_cli.usd.opening.dependencies import read_dependencies
+from defshade_cli.usd.opening.stage import open_stage
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
 
 BINDS = '(prepend apiSchemas = ["MaterialBindingAPI"])'
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from pxr import UsdGeom, Vt
 from scipy.interpolate import BSpline
 
-from defshade_cli.usd.geometry import is_time_varying
-from defshade_cli.usd.nurbs_curves import read_nurbs_curves
-from defshade_cli.usd.strands import Strands
+from defshade_cli.usd.curves.nurbs_curves import read_nurbs_curves
+from defshade_cli.usd.curves.strands import Strands
+from defshade_cli.usd.surfaces.geometry import is_time_varying
 from prims import DEFAULT, new_stage, read, reasons, set_primvar
 from test_nurbs import CIRCLE, CIRCLE_KNOTS, WEIGHTS
 

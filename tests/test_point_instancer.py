@@ -10,8 +10,8 @@ import pytest
 from pxr import Gf, Usd, UsdGeom, Vt
 
 from defshade_cli.scene.scene import Scene
+from defshade_cli.usd.opening.stage import open_stage
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
 from stages import (
     MATERIALS,
     TREE,

@@ -18,9 +18,9 @@ from defshade_cli.image.reading import read, read_header
 from defshade_cli.scene.product import Product, Variable
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import OutputSettings, RenderJob
-from defshade_cli.usd.products import read_products
+from defshade_cli.usd.opening.stage import open_stage
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
+from defshade_cli.usd.render_settings.products import read_products
 
 STAGE = """#usda 1.0
 ( renderSettingsPrimPath = "/Render/final" )

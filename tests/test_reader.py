@@ -10,8 +10,8 @@ import pytest
 from pxr import Usd, UsdGeom
 
 from defshade_cli.errors import DefshadeError, EmptyStage
+from defshade_cli.usd.opening.stage import open_stage
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
 from stages import column_vectors, placed, positions, read, reasons, stage_of, stages_in
 
 CUBE = 'def Cube "cube" {\n}\n'

@@ -13,10 +13,11 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.settings import RenderSettings
-from defshade_cli.usd import cut as cutting
-from defshade_cli.usd import geometry, refiner
+from defshade_cli.usd.polygons import cut as cutting
+from defshade_cli.usd.polygons import refiner
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.sharing import shared
+from defshade_cli.usd.surfaces import geometry
 from stages import read, stage_of
 
 GRID = """def Mesh "grid" {

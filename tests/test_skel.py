@@ -9,10 +9,10 @@ import pytest
 from pxr import Gf, Usd, UsdSkel, Vt
 from scipy.spatial.transform import Rotation
 
+from defshade_cli.usd.opening.stage import open_stage
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.skel.influences import Influences
 from defshade_cli.usd.skel.skinning import DualQuaternionBlend, LinearBlend
-from defshade_cli.usd.stage import open_stage
 from rigs import animation, moulded, rig, shape, triangle, world_points
 from stages import instance, move, read, reasons, stage_of
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from defshade_cli.usd.gprims import cube, sphere
-from defshade_cli.usd.normals import faceted
-from defshade_cli.usd.polygons import Primvar
+from defshade_cli.usd.gprims.gprims import cube, sphere
+from defshade_cli.usd.polygons.normals import faceted
+from defshade_cli.usd.polygons.polygons import Primvar
 from defshade_cli.usd.skel.transport import transported
 from rigs import animation, moulded, rig, shape, world_points
 from stages import read, reasons

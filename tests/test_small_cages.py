@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from defshade_cli.usd.control import Control, smooth_control
-from defshade_cli.usd.end_to_end import signature
-from defshade_cli.usd.polygons import Interpolation, Polygons, Primvar, Scheme
-from defshade_cli.usd.refiner import Refiner
-from defshade_cli.usd.small_cages import Cage, refine_all
+from defshade_cli.usd.polygons.control import Control, smooth_control
+from defshade_cli.usd.polygons.end_to_end import signature
+from defshade_cli.usd.polygons.polygons import Interpolation, Polygons, Primvar, Scheme
+from defshade_cli.usd.polygons.refiner import Refiner
+from defshade_cli.usd.polygons.small_cages import Cage, refine_all
 from defshade_cli.usd.subdivision import LinearInterpolation
 
 INTERPOLATIONS: tuple[Interpolation, ...] = ("constant", "uniform", "varying", "vertex", "faceVarying")

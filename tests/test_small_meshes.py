@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import NDArray
 
 from defshade_cli.scene.geometry import Mesh
-from defshade_cli.usd.cut import cut
-from defshade_cli.usd.normals import with_normals
-from defshade_cli.usd.polygons import Interpolation, Polygons, Primvar, Scheme
-from defshade_cli.usd.small_meshes import Shaped, shape_all
-from defshade_cli.usd.subsets import Faces
+from defshade_cli.usd.polygons.cut import cut
+from defshade_cli.usd.polygons.normals import with_normals
+from defshade_cli.usd.polygons.polygons import Interpolation, Polygons, Primvar, Scheme
+from defshade_cli.usd.polygons.small_meshes import Shaped, shape_all
+from defshade_cli.usd.polygons.subsets import Faces
 
 INTERPOLATIONS: tuple[Interpolation, ...] = ("constant", "uniform", "varying", "vertex", "faceVarying")
 

@@ -11,8 +11,15 @@ import pytest
 from pxr import Tf, Usd, UsdGeom, UsdUtils
 
 from defshade_cli.errors import StageNotFound
+from defshade_cli.usd.opening.stage import (
+    first_frame,
+    frames_per_second,
+    meters_per_unit,
+    open_stage,
+    stage_name,
+    up_axis,
+)
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import first_frame, frames_per_second, meters_per_unit, open_stage, stage_name, up_axis
 from stages import positions, stage_of
 
 CUBE = '#usda 1.0\ndef Cube "cube" {\n}\n'

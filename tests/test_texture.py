@@ -21,8 +21,8 @@ from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.texture import Channel, ImageFile, Texture, TextureInput
 from defshade_cli.settings import RenderSettings
+from defshade_cli.usd.opening.stage import open_stage
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
 from texels import SIDE, linear, noise, save
 
 FULL_VIEW = camera(z=1.0, half=1.0)

@@ -16,8 +16,8 @@ from defshade_cli.gpu.textures import group_images
 from defshade_cli.image import texture as images
 from defshade_cli.image.texture import Source, TexelImage, load_images
 from defshade_cli.scene.texture import ImageFile
+from defshade_cli.usd.opening.stage import open_stage
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
 from texels import SIDE, linear, load, noise, save
 
 BACK_SLASHES = """#usda 1.0

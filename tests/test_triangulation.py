@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from defshade_cli.usd.polygons import Polygons
-from defshade_cli.usd.triangulation import LARGEST_CLIPPED, triangulate
+from defshade_cli.usd.polygons.polygons import Polygons
+from defshade_cli.usd.polygons.triangulation import LARGEST_CLIPPED, triangulate
 
 Ring = NDArray[np.float64]
 

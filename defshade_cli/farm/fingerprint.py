@@ -18,7 +18,7 @@ from pathlib import Path
 from defshade_cli import __version__
 from defshade_cli.errors import StageError
 from defshade_cli.settings import RenderJob
-from defshade_cli.usd.dependencies import read_dependencies
+from defshade_cli.usd.opening.dependencies import read_dependencies
 
 log = logging.getLogger("defshade")
 

@@ -14,10 +14,10 @@ from defshade_cli.scene.framing import THREE_QUARTER, Framing
 from defshade_cli.scene.product import Product
 from defshade_cli.settings import RenderJob, RenderSettings
 from defshade_cli.usd.blame import blaming
-from defshade_cli.usd.products import lost_products, read_products
+from defshade_cli.usd.opening.stage import first_frame, open_stage
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.saved_settings import read_own_settings
-from defshade_cli.usd.stage import first_frame, open_stage
+from defshade_cli.usd.render_settings.products import lost_products, read_products
+from defshade_cli.usd.render_settings.saved_settings import read_own_settings
 
 log = logging.getLogger("defshade")
 

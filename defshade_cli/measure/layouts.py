@@ -19,8 +19,8 @@ from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import LAYOUTS, Layout, RenderSettings
+from defshade_cli.usd.opening.stage import open_stage
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
 
 SIZE = (480, 270)
 _HEADER = "| stage | " + " | ".join(f"{layout}, median | p99.9" for layout in LAYOUTS) + " |"

@@ -30,8 +30,8 @@ from defshade_cli.plan import make_plan
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderSettings
 from defshade_cli.spaces import normalize
+from defshade_cli.usd.opening.stage import open_stage
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
 
 ITEMS = ("arnold_lux_sphere", "arnold_lux_rect")
 SIZE = (160, 120)

@@ -1,7 +1,7 @@
 """Light groups: which layers `light:…` a light adds to.
 
 light:key*      lights whose group, or whose prim's name, matches; the group is what inputs:lightGroup says, or its
-                like of RenderMan, Arnold and Karma (usd/light.py)
+                like of RenderMan, Arnold and Karma (usd/lights/light.py)
 light:/World/*  lights whose path matches
 light:default   lights that no other layer of the request holds, and all that is emitted
 """

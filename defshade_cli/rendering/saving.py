@@ -10,7 +10,7 @@ from defshade_cli.plan import Plan
 from defshade_cli.scene.product import Variable
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderJob
-from defshade_cli.usd.saved_settings import SavedSettings, write_settings
+from defshade_cli.usd.render_settings.saved_settings import SavedSettings, write_settings
 
 _TYPES = {1: "float", 2: "float2", 3: "color3f", 4: "color4f"}
 

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pxr import Tf, Usd
 
 from defshade_cli.errors import DefshadeError, StageError
-from defshade_cli.usd.diagnostics import commentary
+from defshade_cli.usd.opening.diagnostics import commentary
 
 _REASONS = (Tf.ErrorException, TypeError, ValueError, ArithmeticError, AttributeError, LookupError)
 

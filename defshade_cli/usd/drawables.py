@@ -15,10 +15,10 @@ from defshade_cli.scene.geometry import Drawable, Mesh, Subset
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import Material
 from defshade_cli.usd.facing import PlacedSurface
-from defshade_cli.usd.geometry import FaceGroup, Gprim, Surface
-from defshade_cli.usd.instancing import Piece
-from defshade_cli.usd.mesh_light import Glow, shown_material
+from defshade_cli.usd.instancing.instancing import Piece
+from defshade_cli.usd.lights.mesh_light import Glow, shown_material
 from defshade_cli.usd.palette import Palette
+from defshade_cli.usd.surfaces.geometry import FaceGroup, Gprim, Surface
 
 Glowing = tuple[Glow, tuple[Light, ...]]
 

@@ -2,7 +2,7 @@
 
 lines    of models in draw modes are a part of the model's size wide, and no thinner than a pixel
 auto     points are spheres, round under any transform, and curves are tubes
-fixed    points are disks across the view, of their width as it is seen where they stand; curves see usd/strands.py
+fixed    points are disks across the view, as wide as it is seen where they stand; curves see usd/curves/strands.py
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from defshade_cli.scene.view import View
 from defshade_cli.spaces import transform_points
-from defshade_cli.usd.copies import rounded
-from defshade_cli.usd.geometry import Surface
-from defshade_cli.usd.instancing import Piece, some
+from defshade_cli.usd.gprims.copies import rounded
+from defshade_cli.usd.instancing.instancing import Piece, some
+from defshade_cli.usd.surfaces.geometry import Surface
 
 PlacedSurface = tuple[Piece, Surface]
 

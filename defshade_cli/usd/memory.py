@@ -11,11 +11,22 @@ from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.texture import SeenFrom
-from defshade_cli.usd import draw_mode
-from defshade_cli.usd.binding import NOTHING_ABOVE, NOTHING_BOUND, Bindings, Bound, Known, read_bound
 from defshade_cli.usd.blame import blamed
-from defshade_cli.usd.checked import check_all
-from defshade_cli.usd.geometry import (
+from defshade_cli.usd.kind import Kinds
+from defshade_cli.usd.materials.binding import NOTHING_ABOVE, NOTHING_BOUND, Bindings, Bound, Known, read_bound
+from defshade_cli.usd.materials.material import ReadMaterial, not_understood, read_material
+from defshade_cli.usd.models import draw_mode
+from defshade_cli.usd.opening.stage import has_clips
+from defshade_cli.usd.polygons.checked import check_all
+from defshade_cli.usd.polygons.polygons import Polygons
+from defshade_cli.usd.polygons.positions import is_carried_by_velocities
+from defshade_cli.usd.polygons.primvars import DISPLAY_COLOR
+from defshade_cli.usd.polygons.shapes import Shapes
+from defshade_cli.usd.polygons.subsets import material_subsets
+from defshade_cli.usd.polygons.told import Told, told_of
+from defshade_cli.usd.said import Said
+from defshade_cli.usd.sharing import shared
+from defshade_cli.usd.surfaces.geometry import (
     Shape,
     Surface,
     is_time_varying,
@@ -24,17 +35,6 @@ from defshade_cli.usd.geometry import (
     read_surface,
     surface_of,
 )
-from defshade_cli.usd.kind import Kinds
-from defshade_cli.usd.material import ReadMaterial, not_understood, read_material
-from defshade_cli.usd.polygons import Polygons
-from defshade_cli.usd.positions import is_carried_by_velocities
-from defshade_cli.usd.primvars import DISPLAY_COLOR
-from defshade_cli.usd.said import Said
-from defshade_cli.usd.shapes import Shapes
-from defshade_cli.usd.sharing import shared
-from defshade_cli.usd.stage import has_clips
-from defshade_cli.usd.subsets import material_subsets
-from defshade_cli.usd.told import Told, told_of
 
 if TYPE_CHECKING:
     from defshade_cli.usd.skel import Rigs

@@ -8,7 +8,7 @@ from pxr import Usd
 
 from defshade_cli.scene.material import UNBOUND, Material
 from defshade_cli.scene.scene import Unsupported
-from defshade_cli.usd.binding import PURPOSES, Bindings
+from defshade_cli.usd.materials.binding import PURPOSES, Bindings
 from defshade_cli.usd.memory import Memory
 
 

@@ -25,28 +25,28 @@ from defshade_cli.scene.texture import SeenFrom
 from defshade_cli.scene.view import View
 from defshade_cli.settings import Complexity
 from defshade_cli.spaces import Window, conform_window
-from defshade_cli.usd import stage as facts
 from defshade_cli.usd.blame import blaming
 from defshade_cli.usd.camera import choose_camera, default_window, find_cameras, framed_camera, read_camera
-from defshade_cli.usd.complexity import UNIFORM_LEVELS, choose_levels
 from defshade_cli.usd.drawables import Glowing, drawables_of
-from defshade_cli.usd.extent import extents_of
 from defshade_cli.usd.facing import PlacedSurface, faced
 from defshade_cli.usd.garbage import uncollected
-from defshade_cli.usd.geometry import Gprim, Surface
 from defshade_cli.usd.identity import read_assets, read_labels
-from defshade_cli.usd.instancing import Piece
-from defshade_cli.usd.light import camera_light
-from defshade_cli.usd.linking import link
+from defshade_cli.usd.instancing.instancing import Piece
+from defshade_cli.usd.lights.light import camera_light
+from defshade_cli.usd.lights.linking import link
+from defshade_cli.usd.lights.mesh_light import Glows, glowing_lights
 from defshade_cli.usd.memory import Memory
-from defshade_cli.usd.mesh_light import Glows, glowing_lights
+from defshade_cli.usd.opening import stage as facts
+from defshade_cli.usd.opening.unresolved import by_reason, find_unresolved
 from defshade_cli.usd.palette import Palette
-from defshade_cli.usd.render_pass import pass_issues, read_pass
-from defshade_cli.usd.settings import read_settings
+from defshade_cli.usd.render_settings.render_pass import pass_issues, read_pass
+from defshade_cli.usd.render_settings.settings import read_settings
 from defshade_cli.usd.sharing import shared
-from defshade_cli.usd.tessellation import Tessellation
+from defshade_cli.usd.surfaces.complexity import UNIFORM_LEVELS, choose_levels
+from defshade_cli.usd.surfaces.extent import extents_of
+from defshade_cli.usd.surfaces.geometry import Gprim, Surface
+from defshade_cli.usd.surfaces.tessellation import Tessellation
 from defshade_cli.usd.traversal import Traversal
-from defshade_cli.usd.unresolved import by_reason, find_unresolved
 
 log = logging.getLogger("defshade")
 
@@ -56,7 +56,7 @@ class StageReader:
 
     camera: path or name; without it the rule of usd/camera.py picks.
     purposes: of the geometry that is drawn; without them those of the render settings.
-    render_settings, product: paths of their prims; settings are found as usd/products.py does.
+    render_settings, product: paths of their prims; settings are found as usd/render_settings/products.py does.
     complexity: of subdivision surfaces and, where it is not `auto`, of solids as Hydra makes cages of them; for `auto`
         it matters how large the image is, see scene.camera.image_size.
     framing: a camera of ours in place of the stage's.  studio: lights of ours where the stage has none.

@@ -16,21 +16,21 @@ from pxr import Sdf, Usd, UsdGeom, UsdLux
 
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.scene import Unsupported
-from defshade_cli.usd.binding import Bindings, bound_to
 from defshade_cli.usd.blame import blamed
-from defshade_cli.usd.copies import Copies, once
-from defshade_cli.usd.draw_mode import FULL, handed_down, mode_above, takes_effect
-from defshade_cli.usd.geometry import Surface, is_time_varying
-from defshade_cli.usd.instancing import Piece, Standing, finite, place
+from defshade_cli.usd.gprims.copies import Copies, once
+from defshade_cli.usd.instancing.instancing import Piece, Standing, finite, place
+from defshade_cli.usd.instancing.native_instances import NativeInstances
+from defshade_cli.usd.instancing.point_instancer import has_varying_copies, read_point_instancer
 from defshade_cli.usd.kind import Kind, Nature
-from defshade_cli.usd.light import is_light, read_light
+from defshade_cli.usd.lights.light import is_light, read_light
+from defshade_cli.usd.lights.mesh_light import Glow
+from defshade_cli.usd.materials.binding import Bindings, bound_to
 from defshade_cli.usd.memory import Asked, Memory
-from defshade_cli.usd.mesh_light import Glow
-from defshade_cli.usd.native_instances import NativeInstances
-from defshade_cli.usd.point_instancer import has_varying_copies, read_point_instancer
-from defshade_cli.usd.polygons import Polygons
-from defshade_cli.usd.render_pass import PassRules
+from defshade_cli.usd.models.draw_mode import FULL, handed_down, mode_above, takes_effect
+from defshade_cli.usd.polygons.polygons import Polygons
+from defshade_cli.usd.render_settings.render_pass import PassRules
 from defshade_cli.usd.said import Said, said_of
+from defshade_cli.usd.surfaces.geometry import Surface, is_time_varying
 from defshade_cli.usd.values import STANDS_NOWHERE
 from defshade_cli.usd.xform import IDENTITY, gf_matrix, matrix
 

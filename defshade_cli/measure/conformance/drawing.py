@@ -30,9 +30,9 @@ from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.framing import Held
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderSettings
-from defshade_cli.usd.extent import stage_extent
+from defshade_cli.usd.opening.stage import open_stage
 from defshade_cli.usd.reader import StageReader
-from defshade_cli.usd.stage import open_stage
+from defshade_cli.usd.surfaces.extent import stage_extent
 
 Picture = NDArray[np.float32]
 Places = tuple[tuple[float, float], ...]

@@ -10,8 +10,8 @@ import numpy as np
 
 from defshade_cli import resources
 from defshade_cli.measure.fuzz.mutations import mutated
-from defshade_cli.usd.conversion import write_as
-from defshade_cli.usd.dependencies import read_dependencies
+from defshade_cli.usd.opening.conversion import write_as
+from defshade_cli.usd.opening.dependencies import read_dependencies
 
 _STAGE_LIES = 0.6
 """How often it is the stage's own file, where it depends on others."""

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.usd.geometry import Surface
-from defshade_cli.usd.polygons import Polygons, Primvar
-from defshade_cli.usd.sweep import swept
+from defshade_cli.usd.curves.sweep import swept
+from defshade_cli.usd.polygons.polygons import Polygons, Primvar
+from defshade_cli.usd.surfaces.geometry import Surface
 
 
 class Body(NamedTuple):

@@ -13,14 +13,14 @@ from pxr import Usd, UsdGeom, UsdSkel
 
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.spaces import Matrix
-from defshade_cli.usd.geometry import Surface
-from defshade_cli.usd.polygons import Polygons, Primvar
+from defshade_cli.usd.polygons.polygons import Polygons, Primvar
 from defshade_cli.usd.skel.animation import Animation, Pose
 from defshade_cli.usd.skel.blendshapes import BlendShapes, Offsets, read_blend_shapes
 from defshade_cli.usd.skel.body import Body, body_of, with_body
 from defshade_cli.usd.skel.influences import Influences, read_influences
 from defshade_cli.usd.skel.skinning import DualQuaternionBlend, LinearBlend, Skinning, inverse_transposes
 from defshade_cli.usd.skel.transport import transported
+from defshade_cli.usd.surfaces.geometry import Surface
 from defshade_cli.usd.xform import matrix
 
 T = TypeVar("T")

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.spaces import cross, normalize
-from defshade_cli.usd.normals import faceted
-from defshade_cli.usd.polygons import Polygons, Primvar
+from defshade_cli.usd.polygons.normals import faceted
+from defshade_cli.usd.polygons.polygons import Polygons, Primvar
 
 Vectors = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""Curves of all bases, as tubes, ribbons and lines."""

@@ -1,0 +1,1 @@
+"""A subtree placed N times, by native instances and by PointInstancers."""

@@ -1,0 +1,77 @@
+"""Native instances: gathered while a subtree is walked, then placed together by prototype."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from pxr import Sdf, Usd
+
+from defshade_cli.usd.instancing.instancing import Placement, Standing, read_display_of_instances
+from defshade_cli.usd.materials.binding import Bindings
+from defshade_cli.usd.memory import Memory
+from defshade_cli.usd.xform import matrices
+
+
+class Sharing(NamedTuple):
+    """What instances have in common that are placed together. animation: that their skeletons inherit."""
+
+    prototype: Sdf.Path
+    animation: Sdf.Path | None
+    bindings: Bindings
+    in_world: bool
+    purpose: str | None
+
+
+class Instance(NamedTuple):
+    """order: among the instances of its prototype in the subtree."""
+
+    prim: Usd.Prim
+    here: Standing
+    order: int
+
+
+class NativeInstances:
+    """The native instances of one subtree.
+
+    issues: by instance, what of it was left out.
+    """
+
+    def __init__(self, memory: Memory) -> None:
+        self.issues: dict[Usd.Prim, list[str]] = {}
+        self._memory = memory
+        self._met: Counter[Sdf.Path] = Counter()
+        self._shared: dict[Sharing, list[Instance]] = defaultdict(list)
+
+    def add(self, prim: Usd.Prim, here: Standing) -> None:
+        """Note an instance, with those that share its prototype and all that it inherits."""
+        prototype = prim.GetPrototype().GetPath()
+        animation = self._memory.rigs.animation_of(here.on_stage(prim))
+        sharing = Sharing(prototype, animation, self._memory.bindings(prim.GetPath()), here.in_world, here.purpose)
+        self._shared[sharing].append(Instance(prim, here, self._met[prototype]))
+        self._met[prototype] += 1
+
+    def placements(self, time: Usd.TimeCode) -> Iterator[tuple[Sharing, Instance, Placement]]:
+        """What some instances share, the first of them, and the placement of all, for each prototype and difference."""
+        for sharing, instances in self._shared.items():
+            yield sharing, instances[0], self._placement(sharing, instances, time)
+
+    def _placement(self, sharing: Sharing, instances: list[Instance], time: Usd.TimeCode) -> Placement:
+        first = instances[0].prim
+        displays = [
+            read_display_of_instances(instance.prim, time, 1, self.issues.setdefault(instance.prim, []))
+            for instance in instances
+        ]
+        return Placement(
+            matrices([instance.here.root_from_prim for instance in instances]),
+            np.array([instance.order for instance in instances], np.int32),
+            np.concatenate([color for color, _ in displays]),
+            np.concatenate([opacity for _, opacity in displays]),
+            sharing.purpose,
+            sharing.bindings,
+            sharing.in_world,
+            prototype=self._memory.name_prototype(first.GetPrototype(), first),
+            roots=tuple(self._memory.shown(instance.prim.GetPath()) for instance in instances),
+        )

@@ -1,0 +1,1 @@
+"""Models drawn as boxes, axes or cards in their place."""

@@ -1,0 +1,1 @@
+"""NurbsPatches and their trim curves."""

@@ -1,0 +1,1 @@
+"""Polygon meshes: what lies on them, their normals, refinement and triangles; those of small ones all at once."""

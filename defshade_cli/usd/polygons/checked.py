@@ -1,0 +1,120 @@
+"""Small meshes as polygons, checked all at once.
+
+Of what is sound in everything nothing needs to be said: it becomes what mesh.py makes of it, which has the others.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from defshade_cli.usd.polygons.end_to_end import blocks, lay_bare
+from defshade_cli.usd.polygons.normals import unit_normals
+from defshade_cli.usd.polygons.polygons import Interpolation, Polygons, Primvar
+from defshade_cli.usd.polygons.primvars import count_elements
+from defshade_cli.usd.polygons.told import Lying, Told
+
+_NO_HOLES = np.empty(0, np.int32)
+
+
+def check_all(meshes: Sequence[Told]) -> list[Polygons | None]:
+    """The polygons of each mesh that is sound, None of any other."""
+    sound = {number for number, drawn in enumerate(_are_drawn(meshes)) if drawn}
+    sound -= {number for number in sound if not _fits(meshes[number])}
+    lying = [(number, each) for number in sound for each in meshes[number].carried]
+    sound -= {
+        number for (number, _), fine in zip(lying, _are_sound([each for _, each in lying]), strict=True) if not fine
+    }
+    with_normals = [number for number in sound if meshes[number].normals]
+    normals = _unit_normals({number: meshes[number] for number in with_normals})
+    sound -= {*with_normals} - normals.keys()
+    return [_polygons(mesh, normals.get(n)) if n in sound else None for n, mesh in enumerate(meshes)]
+
+
+def _are_drawn(meshes: Sequence[Told]) -> list[bool]:
+    """Are all corners at points that exist, and all points finite?"""
+    if not meshes:
+        return []
+    within = _greatest([mesh.indices for mesh in meshes]) < [len(mesh.points) for mesh in meshes]
+    return (within & _are_finite([mesh.points for mesh in meshes])).tolist()
+
+
+def _fits(mesh: Told) -> bool:
+    """Have its primvars and normals as many values as they need?"""
+    lying = mesh.carried if mesh.normals is None else (mesh.normals, *mesh.carried)
+    if not lying:
+        return True
+    due = count_elements(len(mesh.counts), len(mesh.points), len(mesh.indices))
+    return all(
+        len(each.values if each.indices is None else each.indices) == due.get(each.interpolation, 0) for each in lying
+    )
+
+
+def _are_sound(lying: Sequence[Lying]) -> list[bool]:
+    """Are all values finite, and all indices at one of them? None is empty."""
+    if not lying:
+        return []
+    sound = _are_finite([each.values for each in lying])
+    indexed = [number for number, each in enumerate(lying) if each.indices is not None]
+    if indexed:
+        greatest = _greatest([each.indices for each in lying if each.indices is not None])
+        sound[indexed] &= greatest < [len(lying[number].values) for number in indexed]
+    return sound.tolist()
+
+
+def _greatest(indices: Sequence[NDArray[np.int32]]) -> NDArray[np.uint32]:
+    """(M,) of each array, where what is negative counts as large."""
+    return np.maximum.reduceat(np.concatenate(indices).view(np.uint32), _starts(indices))
+
+
+def _are_finite(values: Sequence[NDArray[np.float32]]) -> NDArray[np.bool_]:
+    """(M,) whether each array is finite everywhere."""
+    flat = [each.reshape(-1) for each in values]
+    return np.logical_and.reduceat(np.isfinite(np.concatenate(flat)), _starts(flat))
+
+
+def _starts(arrays: Iterable[NDArray[Any]]) -> NDArray[np.intp]:
+    """(M,) where each begins when they stand end to end."""
+    return np.cumsum([0, *map(len, arrays)])[:-1]
+
+
+def _unit_normals(meshes: Mapping[int, Told]) -> dict[int, Primvar]:
+    """Of the meshes whose normals need no other mending."""
+    alike: dict[tuple[bool, Interpolation], list[int]] = defaultdict(list)
+    normals = {number: mesh.normals for number, mesh in meshes.items() if mesh.normals}
+    for number, each in normals.items():
+        alike[meshes[number].left_handed, each.interpolation].append(number)
+    found: dict[int, Primvar] = {}
+    for (_, interpolation), numbers in alike.items():
+        for block in blocks(numbers, [len(meshes[number].indices) for number in numbers]):
+            row = lay_bare([meshes[number] for number in block])
+            values = np.concatenate([normals[number].values for number in block])
+            units, clear = unit_normals(row, Primvar(values, interpolation))
+            runs = pairwise(row.starts(interpolation).tolist())
+            for number, run, is_clear in zip(block, runs, clear.tolist(), strict=True):
+                if is_clear:
+                    found[number] = Primvar(units[slice(*run)], interpolation)
+    return found
+
+
+def _polygons(mesh: Told, normals: Primvar | None) -> Polygons:
+    others = {each.field: each.primvar for each in mesh.carried if each.field != "uvs"}
+    uvs = {each.name: each.primvar for each in mesh.carried if each.field == "uvs"}
+    return Polygons(
+        mesh.points,
+        mesh.counts,
+        mesh.indices,
+        mesh.faces,
+        _NO_HOLES,
+        mesh.scheme,
+        mesh.left_handed,
+        normals,
+        others.get("display_color"),
+        others.get("display_opacity"),
+        uvs,
+    )

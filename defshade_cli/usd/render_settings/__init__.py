@@ -1,0 +1,1 @@
+"""What the RenderSettings, products and passes of a stage ask for."""
