@@ -153,3 +153,14 @@ def test_lobes_of_any_width_give_the_sky_back(pipeline: Pipeline, roughness: flo
     of = scene([sphere()], [dome()], [metal])
     one, many = (render(pipeline, of, samples=n)[12:20, 12:20, :3].mean() for n in (1, 64))
     np.testing.assert_allclose(many, one, rtol=0.05)
+
+
+def test_samples_do_not_know_what_was_drawn_before(gpu: Gpu) -> None:
+    """Not what was summed, after the small look around that a dome's directions are drawn by."""
+    lit = scene([quad(9.0), sphere(1.0)], [DomeLight(path="/dome", world_from_light=np.eye(4), color=(1, 1, 1))])
+    plans = [make_plan(lit, RenderSettings(size=(160, 90), samples=count)) for count in (2, 4, 4)]
+    pipeline = Pipeline(gpu)
+    first, second = [pipeline.render(lit, plan).layers["beauty"] for plan in plans][1:]
+    alone = Pipeline(gpu).render(lit, plans[1]).layers["beauty"]
+    np.testing.assert_array_equal(first, alone)
+    np.testing.assert_array_equal(second, alone)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.errors import GpuError, GpuMemoryError
 from defshade_cli.gpu.context import Gpu
+from defshade_cli.scene.window import WHOLE_IMAGE
 
 _READ_DTYPE = {"f1": np.uint8, "f2": np.float16, "f4": np.float32, "u4": np.uint32}
 
@@ -51,8 +52,12 @@ class Target:
         return _as_image(self.depth, np.float32, 1)[..., 0]
 
     def keep_to(self, part: Part) -> None:
-        """Draw and clear in a part of the image alone from now on. The framebuffer is bound."""
-        self.framebuffer.scissor = pixels_of(part, self.framebuffer.size)
+        """Draw and clear in a part of the image alone from now on. The framebuffer is bound.
+
+        All of it is no scissor: OpenGL's would hold for what is cleared of other framebuffers too.
+        """
+        framebuffer: Any = self.framebuffer  # moderngl's own types know no None
+        framebuffer.scissor = None if part == WHOLE_IMAGE else pixels_of(part, framebuffer.size)
 
     @contextmanager
     def colours_kept(self) -> Iterator[None]:
