@@ -32,7 +32,7 @@ from defshade_cli.settings import RenderJob, RenderSettings
 
 SIZE = (160, 90)
 SAMPLES, SEEDS = 16, 5
-OURS, CONVERGED = (1, 16), {"simple": 256, "heavy": 64, "manylights": 64}
+OURS, CONVERGED = (1, 2, 8, 16), {"simple": 1024, "heavy": 64, "manylights": 64}
 
 Draw = Callable[[int, int], NDArray[np.float32]]
 """(samples, seed) → (H, W, 3)."""
