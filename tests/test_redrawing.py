@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from build import scene, sun
 from defshade_cli.image.film import Film
+from defshade_cli.plan import make_plan, plan_after
 from defshade_cli.rendering import Renderer, run
 from defshade_cli.settings import RenderJob, RenderSettings
 from stages import move
@@ -150,3 +152,12 @@ def test_what_shows_anywhere_is_drawn_whole(
 ) -> None:
     job = job_of(text, tmp_path, (1.0, 2.0), {"size": (64, 48), "light_points": 1} | settings)
     assert drawn(job, renderer)[1] == ["all", "all"]
+
+
+def test_nothing_after_nothing_is_nothing_to_draw() -> None:
+    settings = RenderSettings(size=(16, 9), shadows=False)
+    empty, again = (scene([], [sun()], drawables=[]) for _ in range(2))
+    first, second = (replace(each, lights=empty.lights) for each in (empty, again))
+    planned = make_plan(first, settings)
+    redrawing = plan_after(first, planned, second, make_plan(second, settings)).redrawing
+    assert (redrawing.reason, redrawing.moved) == ("", 0)

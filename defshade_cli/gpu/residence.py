@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import product
 from types import MappingProxyType
 from typing import Any
 
@@ -17,7 +16,7 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.records import record
 from defshade_cli.gpu.textures import TextureSet, TextureStore, input_records
 from defshade_cli.gpu.vertices import FEW_UV_SETS, in_slots, sets_of, uv_names, uv_slots, vertex_arrays
-from defshade_cli.scene.geometry import Drawable, Mesh
+from defshade_cli.scene.geometry import Drawable, Mesh, box_corners
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.texture import Texture
@@ -270,9 +269,8 @@ def draw_commands(drawables: Sequence[Drawable], meshes: Sequence[Mesh]) -> tupl
 
 def command_corners(scene: Scene) -> NDArray[np.float64]:
     """(C, 8, 3) of the box around each command's drawable, relative to the camera."""
-    boxes = [np.array(list(product(*(box - scene.camera.position).T))) for box in scene.drawable_bounds]
     counts = [len(drawable.subsets) for drawable in scene.drawables]
-    return np.repeat(np.array(boxes).reshape(-1, 8, 3), counts, axis=0)
+    return np.repeat(box_corners(scene.drawable_bounds - scene.camera.position), counts, axis=0)
 
 
 def _first_rows(meshes: Sequence[Mesh]) -> NDArray[np.int64]:

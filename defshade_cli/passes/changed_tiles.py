@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +9,7 @@ from defshade_cli.gpu.targets import pixels_of
 from defshade_cli.passes.light_lists import TILE, tile_grid
 from defshade_cli.passes.screen import regions_of
 from defshade_cli.plan import Plan
+from defshade_cli.scene.geometry import box_corners
 from defshade_cli.spaces import transform_points
 
 Layers = dict[str, NDArray[np.float32]]
@@ -49,8 +48,7 @@ def _rectangles(boxes: NDArray[np.float64], plan: Plan) -> NDArray[np.float64]:
     """(R, 4) left, top, right and bottom in pixels around where the camera sees boxes (N, 2, 3), those ahead of it."""
     camera, (width, height) = plan.camera, plan.size
     left, right, bottom, top = camera.window
-    corners = boxes[:, np.array(list(product((0, 1), repeat=3))), np.arange(3)]
-    seen = transform_points(camera.camera_from_world, corners)
+    seen = transform_points(camera.camera_from_world, box_corners(boxes))
     depth = -seen[..., 2]
     scale = np.ones_like(depth)
     if camera.projection == "perspective":

@@ -52,11 +52,10 @@ class CommandBuffer:
     def write(self, runs: Sequence[NDArray[Any]]) -> None:
         """Upload runs of draw commands, (N,) records each, one behind the other."""
         commands = np.concatenate(runs)
-        data = commands.tobytes()
         self._ends = np.cumsum([0, *map(len, runs)])
         self._breaks = _breaks(commands) if self._gpu.is_software else np.empty(0, np.int64)
-        self._buffer.orphan(max(len(data), self._buffer.size))
-        self._buffer.write(data)
+        self._buffer.orphan(max(commands.nbytes, self._buffer.size))
+        self._buffer.write(commands)
 
     def render(self, array: moderngl.VertexArray, run: int) -> None:
         """Draw a run of those that were written."""

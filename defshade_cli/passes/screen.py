@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.targets import Part, Target
+from defshade_cli.scene.window import WHOLE_IMAGE
 
-WHOLE = np.array([[0.0, 0.0, 1.0, 1.0]], np.float32)
+WHOLE = np.array([WHOLE_IMAGE], np.float32)
 """The one region that is all of the image: left, top, right, bottom as shares of it."""
 
 
@@ -69,7 +70,7 @@ class TileMask:
     def __init__(self, gpu: Gpu) -> None:
         self._context, self._shaders = gpu.context, gpu.shaders
         self._done, self._apart = Screen(gpu), Screen(gpu)
-        self.hide(WHOLE[:0], WHOLE, (1, 1))
+        self.hide_nothing()
 
     @cached_property
     def _arrays(self) -> dict[Screen, moderngl.VertexArray]:
@@ -87,6 +88,10 @@ class TileMask:
         (left, top), (right, bottom) = around[:, :2].min(axis=0), around[:, 2:].max(axis=0)
         self.open = (max(left, 0.0), max(top, 0.0), min(right, 1.0), min(bottom, 1.0))
 
+    def hide_nothing(self) -> None:
+        """All of the image is to be drawn."""
+        self.hide(WHOLE[:0], WHOLE, (1, 1))
+
     def shut(self, target: Target, depth: float) -> None:
         """Write a depth where nothing is to be drawn, and no colours."""
         self._fill(self._apart, target, depth)
@@ -101,7 +106,7 @@ class TileMask:
         for _ in range(2):
             self.empty(target, 0.0)
             self._context.finish()
-        self.hide(WHOLE[:0], WHOLE, (1, 1))
+        self.hide_nothing()
 
     def _fill(self, screen: Screen, target: Target, depth: float) -> None:
         if self.is_empty:
@@ -129,7 +134,7 @@ class Narrowing:
     def end(self) -> None:
         """All of the image from now on."""
         self._screen.cover(WHOLE)
-        self._mask.hide(WHOLE[:0], WHOLE, (1, 1))
+        self._mask.hide_nothing()
 
     @contextmanager
     def of(self, tiles: NDArray[np.bool_] | None, side: int, size: tuple[int, int]) -> Iterator[None]:

@@ -54,10 +54,11 @@ def find_redrawing(before: Scene, planned: Plan, scene: Scene, plan: Plan) -> Re
     changed = _changed_rows(before, scene)
     if changed is None:
         return Redrawing("other things are drawn")
-    moved = np.concatenate([_boxes(one, changed) for one in (before, scene)])
+    places = [_places(one, changed) for one in (before, scene)]
+    moved, radii = (np.concatenate(column) for column in zip(*places, strict=True))
     if not np.isfinite(moved).all():
         return Redrawing("what moves is not finite")
-    shadowed = _shadowed(scene, plan, moved, np.concatenate([_radii(one, changed) for one in (before, scene)]))
+    shadowed = _shadowed(scene, plan, moved, radii)
     if shadowed is None:
         return Redrawing("shadows of what moves fall far and wide")
     return Redrawing("", np.concatenate([moved, shadowed]), len(changed))
@@ -135,21 +136,16 @@ def _mesh_numbers(scene: Scene) -> NDArray[np.int64]:
     return np.repeat(np.array([drawable.mesh for drawable in scene.drawables], np.int64), counts)
 
 
-def _boxes(scene: Scene, rows: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(N, 2, 3) world space, of some instances."""
+def _places(scene: Scene, rows: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Boxes (N, 2, 3) around some instances, and the radii (N,) of balls about the middles of those; world space."""
     if not len(rows):
-        return np.empty((0, 2, 3))
-    bounds = np.array([mesh.bounds for mesh in scene.meshes])[_mesh_numbers(scene)[rows]]
-    return world_boxes(bounds, np.concatenate([d.world_from_object for d in scene.drawables])[rows])
-
-
-def _radii(scene: Scene, rows: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(N,) of balls about the middles of those boxes, world space."""
+        return np.empty((0, 2, 3)), np.empty(0)
     numbers = _mesh_numbers(scene)[rows]
-    known = {number: scene.meshes[number].radius for number in np.unique(numbers).tolist()}
-    linear = np.concatenate([d.world_from_object for d in scene.drawables])[rows, :3, :3]
-    radii = np.array([known[number] for number in numbers.tolist()])
-    return radii * np.linalg.norm(linear, ord=2, axis=(1, 2))
+    matrices = np.concatenate([d.world_from_object for d in scene.drawables])[rows]
+    used, which = np.unique(numbers, return_inverse=True)
+    meshes = [scene.meshes[number] for number in used.tolist()]
+    bounds, radii = (np.array([getattr(mesh, name) for mesh in meshes])[which] for name in ("bounds", "radius"))
+    return world_boxes(bounds, matrices), radii * np.linalg.norm(matrices[:, :3, :3], ord=2, axis=(1, 2))
 
 
 def _same(old: Any, new: Any) -> bool:

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.plan.bounds import LightBounds
 from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.geometry import box_corners
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import transform_points
@@ -114,8 +114,7 @@ def _meet(cones: LightBounds, boxes: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def _may_be_seen(boxes: NDArray[np.float64], camera: Camera) -> NDArray[np.bool_]:
     """(B,) False for those that lie wholly beyond a side of the view, from wherever on the lens."""
-    corners = boxes[:, np.array(list(product((0, 1), repeat=3))), np.arange(3)]
-    x, y, z = np.moveaxis(transform_points(camera.camera_from_world, corners), -1, 0)
+    x, y, z = np.moveaxis(transform_points(camera.camera_from_world, box_corners(boxes)), -1, 0)
     ahead = -z if camera.projection == "perspective" else np.ones_like(z)
     left, right, bottom, top = camera.window
     lens = camera.lens_radius * (1.0 + np.abs(ahead) / (camera.focus_distance or math.inf))

@@ -78,13 +78,18 @@ _CORNERS = np.array(list(product((0, 1), repeat=3)))
 """(8, 3) which end of a box each of its corners has along each axis."""
 
 
+def box_corners(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(..., 8, 3) of boxes (..., 2, 3)."""
+    return np.asarray(boxes[..., _CORNERS, np.arange(3)])
+
+
 def world_boxes(box: NDArray[np.float64], world_from_object: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N, 2, 3) boxes around object-space boxes placed by matrices (N, 4, 4); NaN where one is not finite.
 
     box: (2, 3), or (N, 2, 3).
     """
     finite = np.isfinite(box).all(axis=(-2, -1), keepdims=True)
-    corners = np.where(finite, box, np.nan)[..., _CORNERS, np.arange(3)]
+    corners = box_corners(np.where(finite, box, np.nan))
     linear, offset = world_from_object[:, :3, :3], world_from_object[:, None, :3, 3]
     placed = corners @ linear.transpose(0, 2, 1) + offset
     return np.stack([placed.min(axis=1), placed.max(axis=1)], axis=1)

@@ -34,8 +34,6 @@ vec3 turn_along(vec3 normal, ivec2 pixel, ivec2 next) {
 // The normals of a sample's cell of its pixel, each of which stands for a disc as wide as its part of it; parts as large as the
 // narrowest lobe do. Cells tile pixels and shrink with the number of samples; a point in each would miss smaller highlights.
 void see_footprint(inout Surface s, ivec2 pixel) {
-    s.footprint = POINT;
-    s.blur = 0.0;
     float roughness = sharpest_roughness(s);
 #ifdef PLANE_WEIGHTS
     if (roughness <= SHARP) s.blur = view.cell.z * view.cell.w * min(s.turn, MOST_TURN) / 6.0;    // neighbours may lie behind

@@ -6,14 +6,13 @@ Of what is sound in everything nothing needs to be said: it becomes what mesh.py
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.usd.polygons.end_to_end import blocks, lay_bare
+from defshade_cli.usd.polygons.end_to_end import blocks, lay_bare, starts_of
 from defshade_cli.usd.polygons.normals import unit_normals
 from defshade_cli.usd.polygons.polygons import Interpolation, Polygons, Primvar
 from defshade_cli.usd.polygons.primvars import count_elements
@@ -69,18 +68,13 @@ def _are_sound(lying: Sequence[Lying]) -> list[bool]:
 
 def _greatest(indices: Sequence[NDArray[np.int32]]) -> NDArray[np.uint32]:
     """(M,) of each array, where what is negative counts as large."""
-    return np.maximum.reduceat(np.concatenate(indices).view(np.uint32), _starts(indices))
+    return np.maximum.reduceat(np.concatenate(indices).view(np.uint32), starts_of(indices))
 
 
 def _are_finite(values: Sequence[NDArray[np.float32]]) -> NDArray[np.bool_]:
     """(M,) whether each array is finite everywhere."""
     flat = [each.reshape(-1) for each in values]
-    return np.logical_and.reduceat(np.isfinite(np.concatenate(flat)), _starts(flat))
-
-
-def _starts(arrays: Iterable[NDArray[Any]]) -> NDArray[np.intp]:
-    """(M,) where each begins when they stand end to end."""
-    return np.cumsum([0, *map(len, arrays)])[:-1]
+    return np.logical_and.reduceat(np.isfinite(np.concatenate(flat)), starts_of(flat))
 
 
 def _unit_normals(meshes: Mapping[int, Told]) -> dict[int, Primvar]:

@@ -5,10 +5,10 @@ Each NumPy call takes as long as some thousand numbers in it, so that small mesh
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +73,11 @@ def signature(mesh: Polygons) -> Hashable:
     uvs = tuple([(name, uv.interpolation) for name, uv in mesh.uvs.items()])
     shown = tuple([(name, each.interpolation, each.values.shape[1:]) for name, each in mesh.shown.items()])
     return mesh.scheme, mesh.left_handed, lying, uvs, shown
+
+
+def starts_of(arrays: Iterable[NDArray[Any]]) -> NDArray[np.intp]:
+    """(M,) where each begins when they stand end to end."""
+    return np.cumsum([0, *map(len, arrays)])[:-1]
 
 
 def blocks(items: Sequence[T], corners: Sequence[int], at_once: int = CORNERS_AT_ONCE) -> Iterator[Sequence[T]]:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.usd.polygons.end_to_end import LARGEST, Row, blocks, lay, signature
+from defshade_cli.usd.polygons.end_to_end import LARGEST, Row, blocks, lay, signature, starts_of
 from defshade_cli.usd.polygons.normals import with_normals
 from defshade_cli.usd.polygons.polygons import Polygons, Primvar
 from defshade_cli.usd.polygons.triangulation import triangulate
@@ -45,7 +45,7 @@ def _small(meshes: Iterable[Polygons]) -> Iterable[Polygons]:
     if not few:
         return ()
     counts = [mesh.counts for mesh in few]
-    most = np.maximum.reduceat(np.concatenate(counts), np.cumsum([0, *map(len, counts)])[:-1])
+    most = np.maximum.reduceat(np.concatenate(counts), starts_of(counts))
     return compress(few, (most <= _MOST_CORNERS).tolist())
 
 
