@@ -148,6 +148,7 @@ def test_a_scene_far_from_the_origin_renders_like_one_at_the_origin(pipeline: Pi
     np.testing.assert_array_equal(films[0].layers["beauty"], films[1].layers["beauty"])
 
 
+@pytest.mark.filterwarnings("error")
 def test_a_frame_without_anything_to_draw_is_empty(pipeline: Pipeline) -> None:
     """All is hidden for now: the layers are their backgrounds, and the frame after is drawn again."""
     empty = scene([], [sun(), bulb(0, 0, 2)], [PLASTIC])

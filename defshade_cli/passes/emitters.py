@@ -43,7 +43,9 @@ class LitSample:
 
 
 def light_batches(scene: Scene, plan: Plan, sample: Sample, guides: SkyGuides = NO_GUIDES) -> Iterator[list[LitSample]]:
-    """All of the plan's lights in order, in runs whose shadow maps fit the atlas together."""
+    """All of the plan's lights in order, in runs whose shadow maps fit the atlas together; none to light nothing."""
+    if scene.is_empty:
+        return
     extent = shadow_extent(scene.bounds - plan.camera.position, plan)
     batch: list[LitSample] = []
     room = AtlasRoom(plan.shadow_resolution)

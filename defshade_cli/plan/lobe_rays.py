@@ -42,8 +42,8 @@ ROUGHEST = 0.7
 def seen_by_rays(
     lights: Sequence[PlannedLight], scene: Scene, settings: RenderSettings, *, thin: bool
 ) -> tuple[PlannedLight, ...]:
-    """The lights, marked. thin: something lets light through."""
-    if thin:
+    """The lights, marked; none where there is no geometry. thin: something lets light through."""
+    if thin or scene.is_empty:
         return tuple(lights)
     chosen = {planned.number for planned in (*_domes(lights, scene, settings), *_lamps(lights, scene, settings))}
     return tuple(replace(planned, by_rays=planned.number in chosen) for planned in lights)

@@ -77,6 +77,11 @@ class Scene:
         """(2, 3) world-space box around every drawable; (+inf, −inf) for a scene without geometry."""
         return enclose([self.drawable_bounds])
 
+    @property
+    def is_empty(self) -> bool:
+        """Is there nothing to draw?"""
+        return bool((self.bounds[0] > self.bounds[1]).any())
+
     @cached_property
     def roomy_bounds(self) -> NDArray[np.float64]:
         """(2, 3) around `bounds`, on a coarse grid: what is fitted to it stays while things move a little."""
