@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "defshade_cli"
 
 FLOORS = (
-    ("errors", "settings", "resources"),
+    ("errors", "settings", "resources", "dataclass"),
     ("spaces", "units"),
     ("scene",),
     ("image",),

@@ -7,12 +7,11 @@ cheaper one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import UsageError
 from defshade_cli.image.false_colour import show_coordinates, show_ids, show_matte, show_vectors
 from defshade_cli.image.layers import ID, SCENE_UNITS, UNIT_VECTOR, Layer

@@ -6,11 +6,10 @@ A tile's box holds all that its pixels see, between its nearest and its farthest
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.plan.bounds import ROUNDING, LightBounds
 
 TILE = 32

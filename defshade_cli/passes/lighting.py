@@ -8,10 +8,10 @@ plane would cut off.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import moderngl
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import DEPTH_CLAMP, Gpu
 from defshade_cli.gpu.outputs import output_defines, outputs_source
 from defshade_cli.gpu.planes import Plane, read_source, uses_standard_depth

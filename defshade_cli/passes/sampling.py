@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.passes.filters import filter_offset
 from defshade_cli.settings import Filter
 

@@ -7,12 +7,13 @@ might, and then all of it is drawn.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.plan.shadow_reach import shadowed_boxes
 from defshade_cli.scene.geometry import Drawable, world_boxes
 from defshade_cli.scene.light import CylinderLight

@@ -16,11 +16,12 @@ so that each of its points bears the same intensity L π R². A cylinder's point
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.distribution import GridDistribution
 from defshade_cli.scene.environment import Environment, harmonics
 from defshade_cli.scene.light import (

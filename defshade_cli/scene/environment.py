@@ -7,13 +7,13 @@ from the left is +X, the top is +Y.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.arrays import frozen
 from defshade_cli.scene.distribution import GridDistribution
 

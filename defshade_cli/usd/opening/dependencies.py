@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 from pathlib import Path
 
 from pxr import Ar, Sdf, Tf, UsdUtils
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import StageError
 from defshade_cli.usd.materials.materialx.document import source_of
 from defshade_cli.usd.materials.materialx.documents import files_of
