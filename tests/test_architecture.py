@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "defshade_cli"
 
 FLOORS = (
-    ("errors", "settings", "resources", "dataclass"),
+    ("errors", "settings", "resources", "dataclass", "garbage"),
     ("spaces", "units"),
     ("scene",),
     ("image",),

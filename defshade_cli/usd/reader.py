@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pxr import Usd
 
 from defshade_cli.errors import EmptyStage
+from defshade_cli.garbage import uncollected
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.framing import Framing, Held
@@ -29,7 +30,6 @@ from defshade_cli.usd.blame import blaming
 from defshade_cli.usd.camera import choose_camera, default_window, find_cameras, framed_camera, read_camera
 from defshade_cli.usd.drawables import Glowing, drawables_of
 from defshade_cli.usd.facing import PlacedSurface, faced
-from defshade_cli.usd.garbage import uncollected
 from defshade_cli.usd.identity import read_assets, read_labels
 from defshade_cli.usd.instancing.instancing import Piece
 from defshade_cli.usd.lights.light import camera_light
