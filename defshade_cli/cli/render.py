@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from defshade_cli.cli.contained import execute_contained
 from defshade_cli.cli.ending import ended_by_sigterm
 from defshade_cli.cli.options import HeadedCommand, Reporting, epilog, takes_job
 from defshade_cli.cli.progress import frame_name, make_progress, start_logging
@@ -48,6 +47,8 @@ def execute(job: RenderJob, reporting: Reporting) -> None:
     """Render `job`, telling of it as `reporting` says. Raises the errors of errors.py."""
     start_logging(reporting)
     if reporting.contained:
+        from defshade_cli.cli.contained import execute_contained
+
         execute_contained(job, reporting)
         return
     frames = max(1, len(job.frames))

@@ -31,7 +31,6 @@ from defshade_cli.passes.light_whole import WholeLighting
 from defshade_cli.passes.lighting import LightingPass, LightingVariant
 from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.lobe_rays import LampRaysPass, LampStore, LobeRays, SkyRaysPass, TreeStore, sky_densities
-from defshade_cli.passes.motion import motion_records, neighbouring_points
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
 from defshade_cli.passes.screen import Narrowing, Screen, TileMask
@@ -163,6 +162,8 @@ class Pipeline:
         """The scene on the GPU, with what the plan's planes read of it."""
         moved: tuple[NDArray[np.float32], ...] = ()
         if "MOTION" in plan.inputs:
+            from defshade_cli.passes.motion import motion_records, neighbouring_points
+
             self._motions.write(motion_records(scene, plan))
             moved = tuple(neighbouring_points(scene))
         return self._scene.update(scene, plan.inputs, moved, plan.primvars, plan.texels, plan.thin)

@@ -20,7 +20,6 @@ from defshade_cli.usd.blame import blamed
 from defshade_cli.usd.gprims.copies import Copies, once
 from defshade_cli.usd.instancing.instancing import Piece, Standing, finite, place
 from defshade_cli.usd.instancing.native_instances import NativeInstances
-from defshade_cli.usd.instancing.point_instancer import has_varying_copies, read_point_instancer
 from defshade_cli.usd.kind import Kind, Nature
 from defshade_cli.usd.lights.light import is_light, read_light
 from defshade_cli.usd.lights.mesh_light import Glow
@@ -293,6 +292,8 @@ class Traversal:
             self._report(prim, *reasons)
 
     def _point_instances(self, prim: Usd.Prim, here: Standing) -> Iterator[Piece]:
+        from defshade_cli.usd.instancing.point_instancer import has_varying_copies, read_point_instancer
+
         swarm = read_point_instancer(prim, self._time, self._base)
         self._report(prim, *swarm.issues)
         self.dormant |= not swarm.placements and has_varying_copies(prim)

@@ -14,9 +14,7 @@ from defshade_cli.dataclass import dataclass
 from defshade_cli.image.colour import Pixels, display_transform, picture
 from defshade_cli.image.encoders.sink import bounded, make_spec, opened, set_attributes
 from defshade_cli.image.film import Film
-from defshade_cli.image.look import look_at_film
 from defshade_cli.image.metadata import text_attributes
-from defshade_cli.image.sheet import contact_sheet
 from defshade_cli.settings import OutputSettings
 
 Hint = tuple[str, str | int]
@@ -77,6 +75,9 @@ def write_picture(film: Film, name: str, output: OutputSettings, path: Path) -> 
 
 def write_sheet(film: Film, names: tuple[str, ...], output: OutputSettings, path: Path) -> None:
     """Write all the layers as tiles of one picture. Raises as `write_picture`: OSError, UsageError."""
+    from defshade_cli.image.look import look_at_film
+    from defshade_cli.image.sheet import contact_sheet
+
     transform = display_transform(output.display, output.view, output.look, film.render_space)
     sheet = contact_sheet({name: look_at_film(film, name, transform) for name in names})
     height, width = sheet.shape[:2]
