@@ -22,6 +22,8 @@ Hint = tuple[str, str | int]
 _DITHER_SEED = 1  # equal films, equal files
 
 
+_SRGB = "sRGB - Display"
+
 _UP = 0x20
 """libpng's PNG_FILTER_UP: one filter for all rows takes half the time of trying each, for files as small."""
 
@@ -30,6 +32,7 @@ _UP = 0x20
 class PictureFormat:
     """bits: a channel, the default first.  hints: attributes for the encoder.
 
+    implied: the colour space that the encoder writes for one that is not named. For a name it loads a whole config.
     fails_badly: on a full disk the encoder ends the process (libjpeg) or never returns (libwebp), so the space is
         claimed beforehand.
     """
@@ -37,6 +40,7 @@ class PictureFormat:
     bits: tuple[int, ...] = (8,)
     alpha: bool = True
     hints: tuple[Hint, ...] = ()
+    implied: str = ""
     fails_badly: bool = False
 
 
@@ -45,7 +49,7 @@ _TIFF = PictureFormat((16, 8), hints=(("compression", "zip"), ("Exif:ColorSpace"
 """Uncalibrated, unless the display is sRGB: an Exif block without any entry is reported as a failure."""
 
 PICTURES = {
-    ".png": PictureFormat((8, 16), hints=(("png:compressionLevel", 1), ("png:filter", _UP))),
+    ".png": PictureFormat((8, 16), hints=(("png:compressionLevel", 1), ("png:filter", _UP)), implied=_SRGB),
     ".jpg": _JPEG,
     ".jpeg": _JPEG,
     ".jxl": PictureFormat((8, 16), hints=(("compression", "jpegxl:100"),)),
@@ -68,7 +72,7 @@ def write_picture(film: Film, name: str, output: OutputSettings, path: Path) -> 
         shown = picture(layer, pixels, transform, alpha=form.alpha)
     bits = bits_of(path, output)
     spec = make_spec(film, shown.shape[-1], f"uint{bits}")
-    if layer.is_color:
+    if layer.is_color and transform.encoding != form.implied:
         spec.set_colorspace(transform.encoding)
     _write(shown, spec, film, path, dithered=output.dither and layer.is_color and bits == 8)
 
