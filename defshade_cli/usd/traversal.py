@@ -124,13 +124,16 @@ class Traversal:
             pieces.append(self._stand_in(prim, here))
             return (), here
         pieces += self._own_pieces(prim, kind, here, said)
-        if self._is_hidden(prim) and (kind is Kind.POINT_INSTANCER or prim.IsInstance()):
+        is_instance = self._memory.instanced and prim.IsInstance()
+        if self._is_hidden(prim) and (kind is Kind.POINT_INSTANCER or is_instance):
             return (), here
         if kind is Kind.POINT_INSTANCER:
             pieces.extend(self._point_instances(prim, here))
             return (), here
-        if prim.IsInstance() and not _is_rigged_from_above(prim, here):
+        if is_instance and not _is_rigged_from_above(prim, here):
             instances.add(prim, here)
+            return (), here
+        if said.is_leaf and not is_instance:
             return (), here
         chosen = Usd.TraverseInstanceProxies(predicate) if here.rig else predicate
         return prim.GetFilteredChildren(chosen), here
@@ -172,7 +175,7 @@ class Traversal:
         found: list[Piece | _Awaited | None] = []
         if self._is_hidden(prim):
             return []
-        if is_light(prim):
+        if is_light(said.schemas):
             found.append(self._light(prim, here))
         if kind is Kind.GPRIM and here.purpose in (None, *self._purposes):
             found.append(self._gprim(prim, here, said))
