@@ -22,7 +22,6 @@ from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.texture import Texture
 
 (
-    VIEW,
     INSTANCES,
     MATERIALS,
     LIGHTS,
@@ -35,10 +34,10 @@ from defshade_cli.scene.texture import Texture
     TRIANGLES,
     LAMPS,
     CELLS,
-) = range(13)
+) = range(1, 13)
 """Binding points of the storage buffers, as the shaders declare them."""
 
-LIGHT_BLOCK, SHADOW_BLOCK = range(2)
+LIGHT_BLOCK, SHADOW_BLOCK, VIEW_BLOCK = range(3)
 """Binding points of the uniform buffers."""
 
 INDICES_IN_POOL = 2

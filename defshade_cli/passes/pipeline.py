@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import MOST_TARGETS, Plane
-from defshade_cli.gpu.residence import LIGHTS, MOTIONS, VIEW, DrawList, GpuScene, RecordBuffer
+from defshade_cli.gpu.residence import LIGHTS, MOTIONS, VIEW_BLOCK, DrawList, GpuScene, RecordBuffer
 from defshade_cli.image.film import Film, Sampling
 from defshade_cli.passes.accumulation import AccumulationPass
 from defshade_cli.passes.changed_tiles import beside, changed_tiles
@@ -72,7 +72,7 @@ class Pipeline:
         gpu.make_current()
         self._scene = GpuScene(gpu)
         self._frame, self._scouted = Frame(gpu), Frame(gpu)
-        self._view = RecordBuffer(gpu, VIEW)
+        self._view = RecordBuffer(gpu, VIEW_BLOCK, uniform=True)
         self._lights = RecordBuffer(gpu, LIGHTS)
         self._motions = RecordBuffer(gpu, MOTIONS)
         self._screen, self._sharp, self._mask = Screen(gpu), Screen(gpu), TileMask(gpu)
@@ -233,7 +233,7 @@ class Pipeline:
         variant = LightingVariant.of(plan)
         self._emission_pass(variant).draw(gbuffer, targets)
         if plan.lighting == "tiles":
-            self._light_tiles.begin(gbuffer, view_record(plan, gbuffer.layout, sample), plan)
+            self._light_tiles.begin(gbuffer, plan, sample)
         openness = self._sky_visibility_pass(variant) if visibility else None
         if openness and visibility:
             openness.begin_sample(visibility)
