@@ -15,9 +15,10 @@ from defshade_cli.measure.error import relative_differences
 from defshade_cli.measure.layouts import first_frame
 from defshade_cli.measure.reference import surface_from_planes
 from defshade_cli.passes.pipeline import Pipeline
+from defshade_cli.passes.sampling import owen_sobol_3d
 from defshade_cli.plan import make_plan
-from defshade_cli.plan.points import share_points
-from defshade_cli.scene.emission import emitter_at
+from defshade_cli.plan.points import share_points, share_shown
+from defshade_cli.scene.emission import Emitter, emitter_at
 from defshade_cli.scene.light import CylinderLight, DiskLight, DomeLight, Light, RectLight, SphereLight
 from defshade_cli.scene.mesh_light import MeshLight
 from defshade_cli.settings import RenderSettings
@@ -88,3 +89,20 @@ def test_large_lights_share_the_points_that_few_samples_lack() -> None:
     assert points(0.5, samples=4) == [4] and points(0.5, samples=16) == [1] and points(0.5, samples=100) == [1]
     assert points(0.5, of=1) == [1] and points(*[0.5] * 64) == [1] * 64
     assert all(math.log2(n).is_integer() for n in points(*[0.5] * 5))
+
+
+def test_discs_that_small_lights_show_as_vary_as_the_light_does() -> None:
+    """All of the light from its centre in the first samples; then half of its area, at places that vary by as much."""
+    ball = SphereLight(path="/l", world_from_light=at(1, 2, 3), color=(1, 1, 1), radius=0.5)
+
+    def shown(index: int) -> Emitter:
+        point = emitter_at(ball, owen_sobol_3d(index % 256, 0), np.zeros(3))
+        disc = point.shown_as(ball, share_shown(index)).shown
+        assert disc is not None
+        return disc
+
+    assert shown(0).position.tolist() == [1, 2, 3] and shown(127).extent == pytest.approx(math.pi * 0.25)
+    assert shown(255).extent == pytest.approx(0.5 * math.pi * 0.25) and share_shown(2**20) < 1e-3
+    aside = np.array([emitter_at(ball, owen_sobol_3d(i, 0), np.zeros(3)).shown_as(ball, 0.5) for i in range(256)])
+    places = np.array([emitter.shown.position - ball.position for emitter in aside])[:, :2]
+    assert np.sum(places**2) / 256 == pytest.approx(0.5 * (0.5 * 0.25), rel=0.02)

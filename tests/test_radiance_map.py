@@ -76,7 +76,7 @@ def test_normalize_divides_by_the_area_and_leaves_the_image() -> None:
 
 
 def test_an_image_lights_what_each_of_its_halves_lights(gpu: Gpu) -> None:
-    """Left half red and right half blue are two rects of half the width; noise of 64 samples of each."""
+    """Left half red and right half blue are two rects of half the width; noise of 128 samples of each."""
     image = np.zeros((8, 8, 3), np.float32)
     image[:, :4, 0] = image[:, 4:, 2] = 1.0
     options = {"path": "/panel", "color": (1, 1, 1), "intensity": 3.0}
@@ -89,7 +89,7 @@ def test_an_image_lights_what_each_of_its_halves_lights(gpu: Gpu) -> None:
     images = []
     for lights in ([whole], halves):
         of = scene([quad(5.0)], lights, [WHITE])
-        plan = make_plan(of, RenderSettings(size=(32, 32), samples=64, shadows=False))
+        plan = make_plan(of, RenderSettings(size=(32, 32), samples=128, shadows=False))
         images.append(pipeline.render(of, plan).layers["beauty"][..., :3])
     np.testing.assert_allclose(images[0], images[1], rtol=0.05, atol=0.02)
     assert images[0][16, 28, 0] > 2 * images[0][16, 28, 2], "red at +X"

@@ -63,6 +63,7 @@ BALL = f"""def Sphere "ball" {{
     {MOVING}
 }}
 """
+HIGHEST = BALL.replace("2, 0)", "4.1, 0)").replace("2.4, 0.3", "4.2, 0.3")
 GLASS = f"""{LOOK}def Sphere "ball" (prepend apiSchemas = ["MaterialBindingAPI"]) {{
     rel material:binding = </look>
     {MOVING}
@@ -118,10 +119,11 @@ def drawn(job: RenderJob, renderer: Renderer) -> tuple[list[Film], list[str]]:
         (INSTANCES, {"layers": DATA}),
         (BALL, {"layers": ("motionForward", "motionBackward")}),
         (BALL, {"shadows": True, "layers": ("beauty", "shadow")}),
+        (HIGHEST, {"shadows": True}),
         (BALL, {"shadows": True, "samples": 3, "lighting": "volumes"}),
         (GLASS, {"shadows": True, "samples": 2, "lighting": "tiles"}),
     ],
-    ids=["plain", "data", "volumes", "tiles", "glass", "instances", "motion", "shadows", "soft", "thin"],
+    ids=["plain", "data", "volumes", "tiles", "glass", "instances", "motion", "shadows", "highest", "soft", "thin"],
 )
 def test_a_part_is_drawn_and_the_picture_is_equal(
     moving: str, settings: dict[str, Any], tmp_path: Path, renderer: Renderer

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from defshade_cli.passes.sampling import CENTRE, owen_sobol, owen_sobol_3d, samples
+from defshade_cli.passes.sampling import CENTRE, lattice, owen_sobol, owen_sobol_3d, samples
 
 
 def test_a_single_sample_is_the_centre() -> None:
@@ -38,3 +38,13 @@ def test_an_integral_converges_faster_than_chance() -> None:
     """x² y over the square is 1/6; 1024 points come within 1e-4, where random ones leave 6e-3."""
     points = np.array([owen_sobol(i, 3) for i in range(1024)])
     assert (points[:, 0] ** 2 * points[:, 1]).mean() == pytest.approx(1 / 6, abs=1e-4)
+
+
+def test_few_samples_bring_a_lattice_to_a_light() -> None:
+    """In an order of each light's own; Sobol's points where the render may stop, or the lattice would be large."""
+    drawn = list(samples(8))
+    places = [sample.on_shape(3, k, 2) for sample in drawn for k in range(2)]
+    assert sorted(places) == sorted(lattice(k, 16) for k in range(16))
+    assert places != [sample.on_shape(4, k, 2) for sample in drawn for k in range(2)]
+    assert [s.on_shape(3) for s in samples(8, may_stop=True)] == [s.on_light(3) for s in drawn]
+    assert drawn[1].on_shape(3, 0, 16) == drawn[1].on_light(3, 0, 16)

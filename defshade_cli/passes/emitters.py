@@ -3,32 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.dataclass import dataclass
 from defshade_cli.image.environment import sky_of
 from defshade_cli.passes.sampling import Sample, samples
 from defshade_cli.passes.shadow_atlas import AtlasRoom
 from defshade_cli.passes.shadow_cameras import ShadowExtent, shadow_cameras
 from defshade_cli.passes.sky_guide import NO_GUIDES, SkyGuides
 from defshade_cli.plan import Plan, PlannedLight
+from defshade_cli.plan.points import share_shown
 from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.distribution import GridDistribution
 from defshade_cli.scene.emission import Emitter, emitter_at, far_field, sky_emitter
 from defshade_cli.scene.environment import Environment
 from defshade_cli.scene.light import DomeLight, RectLight
 from defshade_cli.scene.mesh_light import MeshLight
+from defshade_cli.scene.radiance_map import RadianceMap
 from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import Window
-
-if TYPE_CHECKING:
-    from defshade_cli.scene.distribution import GridDistribution
-    from defshade_cli.scene.radiance_map import RadianceMap
 
 _MIDDLE = 0.0, 0.0, 0.5
 """Of a ball and of a cone of directions."""
@@ -50,7 +47,7 @@ def light_batches(scene: Scene, plan: Plan, sample: Sample, guides: SkyGuides = 
     """All of the plan's lights in order, in runs whose shadow maps fit the atlas together; none to light nothing."""
     if scene.is_empty:
         return
-    extent = shadow_extent(scene.bounds - plan.camera.position, plan)
+    extent = shadow_extent(scene, plan)
     batch: list[LitSample] = []
     room = AtlasRoom(plan.shadow_resolution)
     for number, planned in enumerate(plan.lights):
@@ -77,11 +74,14 @@ def _emitters(
         directions = [sky_emitter(light, sky, u[:2], 1.0 / count, guide, balance) for u in places]
         return [direction.shared_by(plan.samples) for direction in directions]
     if planned.is_whole:
-        return [emitter_at(light, _MIDDLE if plan.samples == 1 else sample.on_light(number), light.position)]
+        point = emitter_at(light, _MIDDLE if plan.samples == 1 else sample.on_shape(number), light.position)
+        return [point.shown_as(light, share_shown(sample.index))]
     if plan.samples * planned.points == 1:
         return [far_field(light)]
     towards = middle_of(extent, plan)
-    places = [sample.on_light(number, k, planned.points) for k in range(planned.points)]
+    is_drawn = isinstance(light, MeshLight) or (isinstance(light, RectLight) and light.radiance_map is not None)
+    place = sample.on_light if is_drawn else sample.on_shape
+    places = [place(number, k, planned.points) for k in range(planned.points)]
     points = [emitter_at(light, u, towards, inside=planned.is_empty) for u in places]
     if isinstance(light, RectLight) and light.radiance_map:
         mean = _mean_weight(light.radiance_map, number, planned.points, plan.samples)
@@ -113,12 +113,13 @@ def middle_of(extent: ShadowExtent, plan: Plan) -> NDArray[np.float64]:
     return np.asarray(extent.receivers.mean(axis=0) + plan.camera.position)
 
 
-def shadow_extent(bounds: NDArray[np.float64], plan: Plan) -> ShadowExtent:
-    """Casters: the (2, 3) bounds, relative to the eye. Receivers: their part of the box around the view's frustum."""
+def shadow_extent(scene: Scene, plan: Plan) -> ShadowExtent:
+    """Casters: the scene's roomy bounds. Receivers: their part of the box around the view's frustum."""
+    bounds = scene.roomy_bounds - plan.camera.position
     rotation, (left, right, bottom, top) = plan.camera.world_from_camera[:3, :3], _filtered_window(plan)
-    scales = plan.depths if plan.camera.projection == "perspective" else (1.0, 1.0)
+    scales = plan.clip if plan.camera.projection == "perspective" else (1.0, 1.0)
     rays = np.array(list(product((left, right), (bottom, top))))
-    frustum = [np.column_stack([rays * s, np.full(4, -z)]) for s, z in zip(scales, plan.depths, strict=True)]
+    frustum = [np.column_stack([rays * s, np.full(4, -z)]) for s, z in zip(scales, plan.clip, strict=True)]
     corners = np.concatenate(frustum) @ rotation.T
     low, high = np.maximum(bounds[0], corners.min(axis=0)), np.minimum(bounds[1], corners.max(axis=0))
     seen = np.stack([low, high]) if (low <= high).all() else bounds

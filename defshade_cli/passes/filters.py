@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from statistics import NormalDist
 
 from defshade_cli.settings import Filter
 
@@ -28,8 +29,6 @@ def _box(u: float) -> float:
 
 
 def _gaussian(u: float) -> float:
-    from statistics import NormalDist
-
     normal = NormalDist()
     low = normal.cdf(-_GAUSSIAN_ENDS)
     return normal.inv_cdf(low + u * (1.0 - 2.0 * low)) / (2.0 * _GAUSSIAN_ENDS)

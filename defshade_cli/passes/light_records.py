@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +15,9 @@ from defshade_cli.passes.shadow_atlas import ShadowAtlas
 from defshade_cli.passes.tables import NO_TABLES, LightTables
 from defshade_cli.plan import PlannedLight
 from defshade_cli.scene.emission import Emitter
+from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import Light, Profile
 from defshade_cli.scene.shadow import PLAIN, ShadowStyle
-
-if TYPE_CHECKING:
-    from defshade_cli.scene.ies import IesProfile
 
 _PROFILES: tuple[Profile, ...] = ("uniform", "cosine", "sine")
 NO_CONE = 2.0 * math.pi
@@ -40,18 +38,19 @@ def light_records(
     places = np.array([emitter.position for emitter in emitters])
     centres = np.array([planned.light.position for planned in lights])
     aside = np.linalg.norm(places - centres, axis=1)
+    shown = [emitter.shown or emitter for emitter in emitters]
     columns = {
         "position": places - eye,
-        "axis": [(p.light if p.is_whole else e).axis for p, e in zip(lights, emitters, strict=True)],
+        "axis": [emitter.axis for emitter in shown],
         "facing": [emitter.facing for emitter in emitters],
         "profile": [_PROFILES.index(emitter.profile) for emitter in emitters],
         "intensity": [emitter.intensity for emitter in emitters],
-        "extent": [emitter.extent for emitter in emitters],
+        "extent": [emitter.extent for emitter in shown],
         "reach": np.array([planned.reach for planned in lights]) + aside,
         "response": [(planned.light.diffuse, planned.light.specular) for planned in lights],
         "radius": [emitter.radius for emitter in emitters],
-        "centre": centres - eye,
-        "is_whole": [planned.is_whole for planned in lights],
+        "centre": [e.shown.position if e.shown else c for e, c in zip(emitters, centres, strict=True)] - eye,
+        "is_whole": [emitter.shown is not None for emitter in emitters],
         "by_rays": [planned.by_rays for planned in lights],
         "is_sky": [planned.light.kind == "dome" for planned in lights],
         "first_link": [tables.links.lights.get(planned.light, ALL_LINKED) for planned in lights],

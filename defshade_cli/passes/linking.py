@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.light import Light
 
 ALL_LINKED = 0xFFFFFFFF

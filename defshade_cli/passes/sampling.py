@@ -7,9 +7,11 @@ with hashes, so that each pair is stratified at every power of two and the pairs
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
 
-from defshade_cli.dataclass import dataclass
 from defshade_cli.passes.filters import filter_offset
 from defshade_cli.settings import Filter
 
@@ -20,6 +22,9 @@ _MASK = 0xFFFFFFFF
 _GOLDEN, _ROOT_3 = 0.6180339887498949, 0.7320508075688772
 _PIXEL, _TEXEL, _LENS, _LIGHTS = range(4)
 
+_MOST_ON_LATTICE = 64
+"""Points of a light; more of them gain nothing by it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Sample:
@@ -27,6 +32,7 @@ class Sample:
 
     pixel: (0.5, 0.5) is the centre; a wide filter passes the pixel's edges.
     cell: what the sample stands for of the pixel: from the sample to its middle, and its width and height, in pixels.
+    among: samples whose points on a light may be chosen together; 0 where the first of them may be all that there are.
     """
 
     index: int
@@ -34,6 +40,7 @@ class Sample:
     texel: Pair
     lens: Pair
     cell: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
+    among: int = 0
 
     @property
     def texel_offset(self) -> Pair:
@@ -44,13 +51,23 @@ class Sample:
         """The k-th of some places on the number-th light; lights with a surface take the first two coordinates."""
         return lattice(k, of) if self is CENTRE else owen_sobol_3d(self.index * of + k, _LIGHTS + number)
 
+    def on_shape(self, number: int, k: int = 0, of: int = 1) -> Triple:
+        """The same on a light that shines alike all over, to which a few samples bring a lattice together."""
+        count = self.among * of
+        if not 0 < count <= _MOST_ON_LATTICE:
+            return self.on_light(number, k, of)
+        return lattice(_order(count, _LIGHTS + number)[self.index * of + k], count)
+
 
 CENTRE = Sample(0, (0.5, 0.5), (0.5, 0.5), (0.5, 0.5))
 """The middle of everything: the only sample of a frame that has one, and the sample of data layers."""
 
 
-def samples(count: int, kind: Filter = "box", width: float = 1.0) -> Iterator[Sample]:
-    """`count` samples, spread over pixels by a filter; just the centre where one is asked."""
+def samples(count: int, kind: Filter = "box", width: float = 1.0, *, may_stop: bool = False) -> Iterator[Sample]:
+    """`count` samples, spread over pixels by a filter; just the centre where one is asked.
+
+    may_stop: the first of them shall be as even as all.
+    """
     if count == 1:
         yield CENTRE
         return
@@ -59,7 +76,8 @@ def samples(count: int, kind: Filter = "box", width: float = 1.0) -> Iterator[Sa
         dx, dy = filter_offset(kind, width, place)
         (left, top), (right, bottom) = (filter_offset(kind, width, corner) for corner in _cell(place, count))
         cell = (0.5 * (left + right) - dx, 0.5 * (top + bottom) - dy, right - left, bottom - top)
-        yield Sample(i, (0.5 + dx, 0.5 + dy), owen_sobol(i, _TEXEL), owen_sobol(i, _LENS), cell)
+        place = (0.5 + dx, 0.5 + dy)
+        yield Sample(i, place, owen_sobol(i, _TEXEL), owen_sobol(i, _LENS), cell, 0 if may_stop else count)
 
 
 def _cell(place: Pair, count: int) -> tuple[Pair, Pair]:
@@ -76,6 +94,13 @@ def lattice(k: int, count: int) -> Triple:
     On a disk's polar coordinates this is the spiral of a sunflower (Vogel 1979).
     """
     return (k + 0.5) / count, (0.5 + k * _GOLDEN) % 1.0, (0.5 + k * _ROOT_3) % 1.0
+
+
+@cache
+def _order(count: int, pattern: int) -> tuple[int, ...]:
+    """Of a lattice's points: samples in a row are spread over it, and know nothing of where they lie in pixels."""
+    places = [owen_sobol(i, pattern)[0] for i in range(count)]
+    return tuple(bisect_left(sorted(places), place) for place in places)
 
 
 def owen_sobol(index: int, pattern: int) -> Pair:

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.records import block_source, record
 from defshade_cli.gpu.residence import SHADOW_BLOCK
 from defshade_cli.gpu.shaders import set_uniforms

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import UsageError
 from defshade_cli.gpu.planes import MOST_PRIMVARS, MOST_TARGETS, Plane, named_planes, needed_planes
 from defshade_cli.image.layers import BEAUTY, LAYERS, PRIMVAR_FAMILY, resolve
@@ -29,6 +27,7 @@ from defshade_cli.plan.shadow_maps import count_maps, shadow_resolution
 from defshade_cli.plan.solidity import solid_materials
 from defshade_cli.plan.texels import seen_texels
 from defshade_cli.scene.camera import Camera, image_size
+from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
@@ -40,9 +39,6 @@ from defshade_cli.settings import FILTERS, Complexity, Debug, Filter, Layout, Li
 from defshade_cli.spaces import transform_points
 from defshade_cli.units import exposure_scale
 
-if TYPE_CHECKING:
-    from defshade_cli.scene.ies import IesProfile
-
 _MARGIN = 1e-3  # relative slack around bounds that float32 may round outwards
 
 
@@ -52,8 +48,7 @@ class Plan:
 
     display, display_camera: the whole image, and the camera conformed to it.
     window: the part of it that is rendered; size and camera are its own.
-    depths: (near, far), the camera's range tightened to the geometry.
-    clip: the same with some room, so that it stays from frame to frame.
+    clip: (near, far), the camera's range tightened to the geometry's roomy bounds.
     render_space: of light and reflectance.
     exposure: linear, the camera's and the settings' together.
     samples: a pixel at most.  cell_parts: see plan/points.py.  max_error, time_limit: of RenderSettings.
@@ -80,7 +75,6 @@ class Plan:
     display_camera: Camera
     window: DataWindow
     camera: Camera
-    depths: tuple[float, float]
     clip: tuple[float, float]
     render_space: RenderSpace
     exposure: float
@@ -272,7 +266,6 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         display_camera=display_camera,
         window=window,
         camera=camera,
-        depths=_tight_clip(camera, scene.bounds),
         clip=_tight_clip(camera, scene.roomy_bounds),
         render_space=find_render_space(settings.render_space or scene.rendering_space, settings.ocio),
         exposure=exposure,

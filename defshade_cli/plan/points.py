@@ -23,8 +23,8 @@ _SMALL, LARGE = 0.03, 0.12
 NEAREST_WHOLE = 6.0
 """Radii of a light around it in which no geometry lies, where it shows as a whole."""
 
-_FEW_SAMPLES = 64
-"""In which small lights show as a whole; more of them see their points, and rays, to the integral."""
+_SHOWN_WHOLE = 128
+"""Samples that show small lights as a whole; in later ones as many discs overlap at each place of the light."""
 
 _PARTS = 8
 """Along a pixel's side, of all cells together: highlights that are smaller are spread over one of them."""
@@ -58,15 +58,20 @@ def cell_parts(settings: RenderSettings) -> int:
 
 
 def is_whole(light: Light, points: int, size: float, settings: RenderSettings) -> bool:
-    """Does it shine from its centre and show in lobes as a whole, its point of each sample casting its shadows alone?
+    """Does it show in lobes as a disc of its own size, its point of each sample casting its shadows alone?
 
-    Round lights that look small, in few samples: their points hardly differ in the diffuse and find few narrow lobes.
+    Round lights that look small: their points hardly differ in the diffuse and find few narrow lobes.
     """
-    if _is_plain(settings) or settings.most_samples > _FEW_SAMPLES or points > 1:
+    if _is_plain(settings) or points > 1:
         return False
     return 0.0 < size < LARGE and (
         isinstance(light, DistantLight) or (isinstance(light, SphereLight) and is_similarity(light.world_from_light))
     )
+
+
+def share_shown(index: int) -> float:
+    """Of the disc of a light that is_whole, in a sample: all of it at first, then ever less."""
+    return min(1.0, _SHOWN_WHOLE / (index + 1))
 
 
 def _is_plain(settings: RenderSettings) -> bool:

@@ -7,13 +7,13 @@ might, and then all of it is drawn.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.dataclass import dataclass
+from defshade_cli.plan.shadow_reach import shadowed_boxes
 from defshade_cli.scene.geometry import Drawable, world_boxes
 from defshade_cli.scene.light import CylinderLight
 from defshade_cli.scene.scene import Scene
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _BY_INSTANCE = ("world_from_object", "instance_ids", "display_color", "display_opacity", "link_sets")
 _OF_THE_SCENE = ("materials", "lights", "labels", "lit_by")
-_APART = frozenset(("camera", "display_camera", "lights", "redrawing", "levels", "depths", "time_limit"))
+_APART = frozenset(("camera", "display_camera", "lights", "redrawing", "levels", "time_limit"))
 """Fields of a plan that are compared otherwise, or that no pixel depends on."""
 
 
@@ -73,8 +73,6 @@ def _shadowed(
         return moved[:0]
     left, right, _, _ = plan.camera.window
     side = _SHADOW_PIXELS * (right - left) / plan.size[0]
-    from defshade_cli.plan.shadow_reach import shadowed_boxes
-
     return shadowed_boxes(scene, lights, plan.shadow_resolution, (moved.mean(axis=1), radii), side)
 
 
@@ -91,7 +89,7 @@ def _reasons(before: Scene, planned: Plan, scene: Scene, plan: Plan) -> Iterator
     if any(not _same(getattr(planned, name), getattr(plan, name)) for name in kept):
         yield "it is planned otherwise"
     fitted = plan.shadows or any(isinstance(planned.light, CylinderLight) for planned in plan.lights)
-    if fitted and not (np.array_equal(before.bounds, scene.bounds) and planned.depths == plan.depths):
+    if fitted and not np.array_equal(before.roomy_bounds, scene.roomy_bounds):
         yield "lights are fitted to other bounds"
     if plan.shadows_lamps or any(plan.shadows_sky(dome) for dome in plan.domes):
         yield "rays find what moves from anywhere"

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from defshade_cli.dataclass import dataclass
 from defshade_cli.image.film import Film
 from defshade_cli.plan import Plan
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.dataclass import dataclass
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import BEAUTY, LAYERS
 from defshade_cli.image.soundness import FrameCheck, check, filled

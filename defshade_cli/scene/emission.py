@@ -16,13 +16,12 @@ so that each of its points bears the same intensity L π R². A cylinder's point
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.dataclass import dataclass
+from defshade_cli.scene.distribution import GridDistribution
 from defshade_cli.scene.environment import Environment, harmonics
 from defshade_cli.scene.light import (
     CylinderLight,
@@ -35,10 +34,8 @@ from defshade_cli.scene.light import (
     SphereLight,
 )
 from defshade_cli.scene.mesh_light import MeshLight
+from defshade_cli.scene.radiance_map import RadianceMap
 from defshade_cli.spaces import cofactors, is_similarity, normalize, transform_points
-
-if TYPE_CHECKING:
-    from defshade_cli.scene.distribution import GridDistribution
 
 Vector = NDArray[np.float64]
 Place = tuple[float, float, float]
@@ -54,6 +51,7 @@ class Emitter:
     facing: (3,) unit, what the profile is measured from.  intensity: (3,) on axis, or a distant light's irradiance.
     extent: world-space area that the point stands for, a distant light's solid angle in steradians; 0 for a point.
     radius: of the glowing ball around the light's position that the point lies in; 0 for another.
+    shown: what shines in its place, where the point casts shadows alone.
     """
 
     position: Vector
@@ -63,6 +61,7 @@ class Emitter:
     intensity: Vector
     extent: float = 0.0
     radius: float = 0.0
+    shown: Emitter | None = None
 
     def shared_by(self, samples: int) -> Emitter:
         """One of `samples` points that stand for the light together."""
@@ -71,6 +70,13 @@ class Emitter:
     def one_of(self, points: int) -> Emitter:
         """One of `points` that shine in the same sample."""
         return replace(self, intensity=self.intensity / points, extent=self.extent / points)
+
+    def shown_as(self, light: Light, share: float) -> Emitter:
+        """As a disc that is a `share` of a round light's, nearer to its middle: size and place vary as the light."""
+        near = math.sqrt(1.0 - share)
+        position = light.position + near * (self.position - light.position)
+        axis = normalize(light.axis + near * (self.axis - light.axis))
+        return replace(self, shown=replace(self, position=position, axis=axis, extent=share * self.extent))
 
     def relative_to(self, origin: Vector) -> Emitter:
         """The same with positions counted from `origin`."""
@@ -171,7 +177,7 @@ def _patch(light: Light, u: Place, towards: Vector) -> _Patch | None:
             return _Patch(np.array([*_circle(u[1], r * math.sqrt(u[0])), 0.0]), _FORWARD, math.pi * r * r)
         case RectLight(width=w, height=h, radiance_map=None):
             return _Patch(np.array([(u[0] - 0.5) * w, (u[1] - 0.5) * h, 0.0]), _FORWARD, w * h)
-        case RectLight(width=w, height=h, radiance_map=shown) if shown is not None:
+        case RectLight(width=w, height=h, radiance_map=RadianceMap() as shown):
             (s, t), weight, density = shown.sample(u[:2])  # its top left is at (+X, +Y)
             return _Patch(np.array([(0.5 - s) * w, (0.5 - t) * h, 0.0]), _FORWARD, w * h / density, weight * density)
         case CylinderLight(radius=r, length=length):

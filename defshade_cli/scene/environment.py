@@ -7,17 +7,15 @@ from the left is +X, the top is +Y.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.arrays import frozen
-
-if TYPE_CHECKING:
-    from defshade_cli.scene.distribution import GridDistribution
+from defshade_cli.scene.distribution import GridDistribution
 
 SkyLayout = Literal["automatic", "latlong", "mirroredBall", "angular", "cubeMapVerticalCross"]
 """Of an image of the sky, by UsdLux's names."""
@@ -145,8 +143,6 @@ class Environment:
 
     @cached_property
     def _distribution(self) -> GridDistribution:
-        from defshade_cli.scene.distribution import GridDistribution
-
         return GridDistribution(self.power)
 
     @cached_property

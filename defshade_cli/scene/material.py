@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Literal
 
-from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.texture import TextureInput
 
 Color = tuple[float, float, float]

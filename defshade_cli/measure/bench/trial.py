@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
-from defshade_cli.dataclass import dataclass
 from defshade_cli.settings import Filter, Layout, RenderSettings
 
 Cost = Literal["wall", "cpu"]

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.dataclass import dataclass
 from defshade_cli.image.film import Film
 from defshade_cli.image.reading import read
 from defshade_cli.measure.conformance.arnold import read_as_arnold

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-
-from defshade_cli.dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True, eq=False)
