@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from pathlib import Path
 from typing import Literal, Self
+
+from defshade_cli.dataclass import dataclass
 
 Layout = Literal["rgba8", "packed", "float"]
 Shading = Literal["preview-surface", "classic"]

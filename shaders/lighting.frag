@@ -7,19 +7,19 @@ flat in Light light;
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     float stored = texelFetch(plane_depth, pixel, 0).x;
-    if (stored == BACKGROUND_DEPTH) discard;
     vec3 position = position_at(gl_FragCoord.xy, camera_depth(stored));
+    Surface surface = read_planes(pixel);
+    see_footprint(surface, pixel);
+    if (stored == BACKGROUND_DEPTH) discard;
     vec3 l;
     vec3 irradiance = irradiance_from(light, position, l);
     if (irradiance == vec3(0.0)) {
         write_nothing();
         return;
     }
-    Surface surface = read_planes(pixel);
     if (!is_lit_by(light, surface)) {
         write_nothing();
         return;
     }
-    see_footprint(surface, pixel);
     write_light(exposed(lit_by(light, l, irradiance, surface, position, direction_to_eye(position))));
 }

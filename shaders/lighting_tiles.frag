@@ -9,14 +9,13 @@ uniform usampler2D tile_runs;      // of each tile, the first entry in the lists
 // Every light of a pixel's tile: what the GBuffer says of it is read once.
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-    float stored = texelFetch(plane_depth, pixel, 0).x;
-    if (stored == BACKGROUND_DEPTH) discard;
     uvec2 run = texelFetch(tile_runs, pixel / LIGHT_TILE, 0).xy;
     if (run.y == 0u) discard;
-    vec3 position = position_at(gl_FragCoord.xy, camera_depth(stored));
+    float stored = texelFetch(plane_depth, pixel, 0).x;
+    vec3 position = position_at(gl_FragCoord.xy, camera_depth(stored)), v = direction_to_eye(position);
     Surface surface = read_planes(pixel);
-    vec3 v = direction_to_eye(position);
     see_footprint(surface, pixel);
+    if (stored == BACKGROUND_DEPTH) discard;
     Lit total = no_light(run.y);
     for (uint i = run.x; i < run.x + run.y; ++i) {
         add_light(total, light_of(light_lists[i]), surface, position, v);

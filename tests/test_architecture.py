@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "defshade_cli"
 
 FLOORS = (
-    ("errors", "settings", "resources"),
+    ("errors", "settings", "resources", "dataclass", "garbage"),
     ("spaces", "units"),
     ("scene",),
     ("image",),
@@ -165,6 +165,21 @@ def test_a_render_imports_no_slow_library_before_it_needs_it() -> None:
     code = "import sys, defshade_cli.cli, defshade_cli.rendering; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert not slow & set(done.stdout.split())
+
+
+def test_a_render_imports_no_module_before_it_needs_it() -> None:
+    """Rooms and modules that many stages do without; each takes a quarter of a millisecond to import."""
+    late = {
+        *("usd.skel", "usd.nurbs", "usd.curves", "usd.subdivision", "usd.identity", "usd.models.cards"),
+        *("usd.instancing.point_instancer", "usd.materials.materialx.document", "usd.opening.mask"),
+        *("image.texture", "image.reading", "image.look", "image.encoders.exr", "image.false_colour"),
+        *("scene.ies", "scene.motion", "scene.studio", "scene.radiance_map", "scene.triangle_tree"),
+        *("plan.shadow_reach", "passes.batch_means", "passes.volumes", "passes.motion", "cli.contained"),
+    }
+    code = "import sys, defshade_cli.cli.render, defshade_cli.rendering; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    early = {module for module in late if f"{PACKAGE.name}.{module}" in done.stdout.split()}
+    assert not early, f"import these where they are needed, or for their types alone: {sorted(early)}"
 
 
 @pytest.mark.parametrize("folder", ["defshade_cli", "tests"])

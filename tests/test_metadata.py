@@ -140,3 +140,19 @@ def test_a_file_of_data_alone_claims_no_colour_space(tmp_path: Path) -> None:
     spec = oiio.ImageInput.open(str(tmp_path / "n.exr")).spec()
     assert spec.get_string_attribute("colorInteropID") == "data"
     assert spec.getattribute("chromaticities") is None
+
+
+def test_pictures_of_the_srgb_display_say_so(tmp_path: Path) -> None:
+    """Which is what their encoders write unasked."""
+    beauty = film().layers["beauty"]
+    shown = {}
+    for view in (None, "Un-tone-mapped"):
+        path = tmp_path / f"{view}.png"
+        files.write(replace(film(), layers={"beauty": beauty}), OutputSettings(view=view), path)
+        shown[view] = path.read_bytes()
+    assert all(b"sRGB\x03" in content and b"gAMA\x00\x00\xb1\x8f" in content for content in shown.values())
+
+
+def test_the_space_of_colours_is_in_the_header(exr: Path) -> None:
+    header = oiio.ImageInput.open(str(exr)).spec()
+    assert header.getattribute("colorInteropID") == header.getattribute("oiio:ColorSpace") == "lin_rec709_scene"

@@ -13,7 +13,6 @@ A command is imported when it is called for, and a driver or a foreign library b
 from __future__ import annotations
 
 import atexit
-import difflib
 import gc
 import os
 import sys
@@ -49,6 +48,8 @@ class _Group(click.Group):
     def get_command(self, context: click.Context, name: str) -> click.Command | None:
         if name in COMMANDS:
             return command_of(name)
+        import difflib
+
         if close := difflib.get_close_matches(name, COMMANDS, 1):
             context.fail(f"no command named '{name}'; did you mean '{close[0]}'?")
         return None

@@ -6,7 +6,6 @@ import functools
 import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +29,7 @@ from defshade_cli.cli.progress import frame_name, make_progress, start_logging
 from defshade_cli.cli.table import BatchTable
 from defshade_cli.cli.tally import Tally
 from defshade_cli.cli.types import Amount, Whole
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import BatchError, UsageError
 from defshade_cli.settings import RenderJob
 

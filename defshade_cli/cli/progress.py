@@ -6,7 +6,6 @@ task's stdout and stderr as one.
 
 from __future__ import annotations
 
-import json
 import logging
 import sys
 from types import TracebackType
@@ -126,6 +125,8 @@ class JsonLines(Progress):
         self._event("failed", message=str(error), exit_code=error.exit_code)
 
     def _event(self, name: str, **facts: Any) -> None:
+        import json
+
         _say(json.dumps({"event": name, "done": self.done, "total": self.total, **facts}))
 
 

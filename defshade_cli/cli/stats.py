@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 from pathlib import Path
 from types import TracebackType
@@ -46,6 +45,8 @@ class Stats:
     def _write(self) -> None:
         if self._path is None:
             return
+        import json
+
         text = json.dumps(plain(self._record), indent=2, allow_nan=False)
         try:
             self._path.write_text(text + "\n", encoding="utf-8")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from defshade_cli.cli.progress import Progress, frame_name
+from defshade_cli.dataclass import dataclass
 
 if TYPE_CHECKING:
     from rich.table import Table

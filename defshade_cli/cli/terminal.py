@@ -13,8 +13,9 @@ import time
 import tty
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Literal
+
+from defshade_cli.dataclass import dataclass
 
 Form = Literal["kitty", "sixel", "blocks"]
 

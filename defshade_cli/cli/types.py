@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import click
-from click.shell_completion import CompletionItem
 
 from defshade_cli.errors import UsageError
 from defshade_cli.settings import VariantChoice
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 Region = tuple[int, int, int, int]
 """(x, y, width, height) in pixels."""
@@ -90,7 +91,7 @@ class Direction(click.ParamType):
         return float(match[1]), float(match[2])
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        return [CompletionItem(name) for name in self.names if name.startswith(incomplete)]
+        return [_completion(name) for name in self.names if name.startswith(incomplete)]
 
 
 class Positive(Finite):
@@ -260,18 +261,24 @@ class Amount(click.ParamType):
 
 def file_completion(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """The shell's own, of files and folders: for names with tokens in them, which click does not know to be paths."""
-    return [CompletionItem(incomplete, type="file")]
+    return [_completion(incomplete, type="file")]
 
 
 def _list_with(choices: Sequence[str], incomplete: str) -> list[CompletionItem]:
     """What the last name of a list with commas between may become; the names before it are kept, and not offered."""
     before, comma, begun = incomplete.rpartition(",")
     given = before.split(",")
-    return [
-        CompletionItem(f"{before}{comma}{name}") for name in choices if name.startswith(begun) and name not in given
-    ]
+    return [_completion(f"{before}{comma}{name}") for name in choices if name.startswith(begun) and name not in given]
+
+
+def _completion(value: str, type: str = "plain") -> CompletionItem:
+    from click.shell_completion import CompletionItem
+
+    return CompletionItem(value, type)
 
 
 def _suggestion(name: str, choices: Sequence[str]) -> str:
+    import difflib
+
     close = difflib.get_close_matches(name, choices, 1)
     return f"did you mean {close[0]!r}?" if close else f"known are {', '.join(choices)}"

@@ -6,8 +6,9 @@ import os
 import re
 import resource
 import time
-from dataclasses import dataclass
 from pathlib import Path
+
+from defshade_cli.dataclass import dataclass
 
 INTERVAL = 0.2
 """Seconds between two looks at workers that have a limit."""

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import logging
+from typing import TYPE_CHECKING
 
 from defshade_cli.farm.fingerprint import Fingerprint
 from defshade_cli.farm.own_settings import with_own_settings
 from defshade_cli.farm.shots import Shot, layers_of, make_shot, wanted_products
 from defshade_cli.image.layers.extras import extras_of
 from defshade_cli.image.layers.variables import layer_of
-from defshade_cli.image.texture import world_to_screen
-from defshade_cli.scene.framing import THREE_QUARTER, Framing
 from defshade_cli.scene.product import Product
 from defshade_cli.settings import RenderJob, RenderSettings
 from defshade_cli.usd.blame import blaming
@@ -18,6 +17,11 @@ from defshade_cli.usd.opening.stage import first_frame, open_stage
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.render_settings.products import lost_products, read_products
 from defshade_cli.usd.render_settings.saved_settings import read_own_settings
+
+if TYPE_CHECKING:
+    from defshade_cli.scene.framing import Framing
+    from defshade_cli.scene.texture import ImageFile
+    from defshade_cli.spaces import Matrix
 
 log = logging.getLogger("defshade")
 
@@ -84,13 +88,21 @@ class OpenJob:
             framing=_framing(settings),
             studio=settings.studio,
             extras=extras_of(layers),
-            seen_from=world_to_screen,
+            seen_from=_world_to_screen,
             beside=next(iter(self._readers.values()), None),
         )
+
+
+def _world_to_screen(file: ImageFile) -> Matrix | None:
+    from defshade_cli.image.texture import world_to_screen
+
+    return world_to_screen(file)
 
 
 def _framing(settings: RenderSettings) -> Framing | None:
     """The camera of ours that is asked for."""
     if not (settings.fit or settings.turntable):
         return None
+    from defshade_cli.scene.framing import THREE_QUARTER, Framing
+
     return Framing(settings.direction or THREE_QUARTER, settings.turntable)

@@ -8,11 +8,11 @@ A step holds the stages that share frames and options; its tasks are one stage a
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import UsageError
 from defshade_cli.farm.frames import OPENJD
 from defshade_cli.settings import RenderJob

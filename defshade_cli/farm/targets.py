@@ -11,7 +11,6 @@ from defshade_cli.farm.shots import Shot
 from defshade_cli.image.colour import display_transform
 from defshade_cli.image.encoders import EXR, check_format, suffix_of
 from defshade_cli.image.files import check_writable, remove_abandoned, targets
-from defshade_cli.image.reading import read_header
 from defshade_cli.image.render_space import RenderSpace
 from defshade_cli.settings import RenderJob
 
@@ -86,6 +85,8 @@ def is_done(job: RenderJob, files: Sequence[Path], fingerprint: str) -> bool:
 
 def _fingerprint_in(file: Path) -> str | None:
     """What the header says; None where it says nothing, or cannot be read, for then the file is not a finished one."""
+    from defshade_cli.image.reading import read_header
+
     try:
         return read_header(file).get(FINGERPRINT)
     except OutputError:

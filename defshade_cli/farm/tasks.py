@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import BatchError, UsageError
 from defshade_cli.farm.shots import Shot, make_shot
 from defshade_cli.farm.targets import check_outputs, remove_leftovers

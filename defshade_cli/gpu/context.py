@@ -11,12 +11,12 @@ import ctypes
 import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, ClassVar, Self, TypeVar
 
 import moderngl
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import GpuError, GpuMemoryError
 from defshade_cli.gpu.shaders import ShaderLibrary
 

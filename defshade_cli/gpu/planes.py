@@ -8,8 +8,8 @@ lighting does not read, only for layers.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.material import Material
 from defshade_cli.settings import Layout
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
 from typing import Any
@@ -12,6 +11,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.records import record
 from defshade_cli.gpu.textures import TextureSet, TextureStore, input_records
@@ -22,7 +22,6 @@ from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.texture import Texture
 
 (
-    VIEW,
     INSTANCES,
     MATERIALS,
     LIGHTS,
@@ -35,10 +34,10 @@ from defshade_cli.scene.texture import Texture
     TRIANGLES,
     LAMPS,
     CELLS,
-) = range(13)
+) = range(1, 13)
 """Binding points of the storage buffers, as the shaders declare them."""
 
-LIGHT_BLOCK, SHADOW_BLOCK = range(2)
+LIGHT_BLOCK, SHADOW_BLOCK, VIEW_BLOCK = range(3)
 """Binding points of the uniform buffers."""
 
 INDICES_IN_POOL = 2

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import moderngl
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import ShaderError
 from defshade_cli.resources import SHADERS
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import GpuError, GpuMemoryError
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.scene.window import WHOLE_IMAGE

@@ -10,18 +10,23 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import field
+from typing import TYPE_CHECKING, Any
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.records import record
-from defshade_cli.image.texture import Source, TexelImage, load_images, resized
 from defshade_cli.scene.material import TEXTURED_FIELDS, Material
 from defshade_cli.scene.texture import FIRST_UDIM, Texture, TextureInput, Wrap
+
+if TYPE_CHECKING:
+    from defshade_cli.image.texture import Source, TexelImage
+
+    Images = Mapping[Source, TexelImage]
 
 _ANISOTROPY = 8.0
 _WRAPS: tuple[Wrap, ...] = ("black", "clamp", "repeat", "mirror")  # then UDIM: shaders/lib/texture.glsl
@@ -29,7 +34,6 @@ _CHANNELS = ("r", "g", "b", "a", "rgb")
 _NO_GROUP = 0xFFFFFFFF
 
 Size = tuple[int, int]
-Images = Mapping[Source, TexelImage]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,6 +73,8 @@ class TextureStore:
         return self._set
 
     def _load(self, worth: Mapping[Texture, float]) -> TextureSet:
+        from defshade_cli.image.texture import Source, load_images
+
         textures = tuple(worth)
         sides: dict[Source, float] = {}
         for texture, side in worth.items():
@@ -103,6 +109,8 @@ class TextureStore:
 
 def group_images(images: Images, limit: int) -> list[dict[Source, TexelImage]]:
     """Images of one size and format together, in at most `limit` groups: resized as little as that takes."""
+    from defshade_cli.image.texture import resized
+
     for fit in _FITS:
         groups: dict[tuple[Any, ...], dict[Source, TexelImage]] = defaultdict(dict)
         for source, image in images.items():
@@ -134,6 +142,8 @@ def place_tiles(
     textures: Sequence[Texture], rows: Mapping[Source, tuple[Size, int, int]], images: Images
 ) -> tuple[NDArray[Any], dict[Texture, tuple[int, int, int, int]]]:
     """Tile records (N,), dense by UDIM number, and where each texture that has any tile finds its own."""
+    from defshade_cli.image.texture import Source
+
     records: list[NDArray[Any]] = []
     places, first = {}, 0
     for texture in textures:

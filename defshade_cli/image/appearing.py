@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-import socket
+import platform
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +12,7 @@ from pathlib import Path
 
 def hidden_prefix() -> str:
     """What the hidden names of this host's writers begin with; the writer's process follows."""
-    return f".{socket.gethostname()}-"
+    return f".{platform.node()}-"
 
 
 @contextmanager

@@ -7,14 +7,12 @@ cheaper one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import UsageError
-from defshade_cli.image.false_colour import show_coordinates, show_ids, show_matte, show_vectors
 from defshade_cli.image.layers import ID, SCENE_UNITS, UNIT_VECTOR, Layer
 from defshade_cli.image.ocio import read_displays
 from defshade_cli.image.render_space import REC709, RenderSpace
@@ -99,6 +97,12 @@ def picture(layer: Layer, pixels: Pixels, transform: DisplayTransform, *, alpha:
     """
     if layer.is_color:
         return transform.apply(pixels if alpha else pixels[..., :3], straight=True)
+    return _data_picture(layer, pixels)
+
+
+def _data_picture(layer: Layer, pixels: Pixels) -> Pixels:
+    from defshade_cli.image.false_colour import show_coordinates, show_ids, show_matte, show_vectors
+
     if layer.unit == UNIT_VECTOR:
         return np.clip(0.5 * pixels + 0.5, 0.0, 1.0)
     if layer.unit == SCENE_UNITS:

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from defshade_cli.dataclass import dataclass
 
 _PIXELS_AT_ONCE = 1 << 18
 

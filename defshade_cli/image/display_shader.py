@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.image.colour import DisplayTransform
 from defshade_cli.image.kept import Arrays
 from defshade_cli.image.ocio import kept_answer, read_config

@@ -21,7 +21,6 @@ from defshade_cli.image.appearing import appearing_at, hidden_prefix
 from defshade_cli.image.encoders import EXR, PICTURES, encode, suffix_of
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import BEAUTY, LAYERS, in_order
-from defshade_cli.image.verification import verify
 from defshade_cli.settings import OutputSettings
 
 
@@ -65,6 +64,8 @@ def write(film: Film, output: OutputSettings, path: Path) -> tuple[Path, ...]:
         with _appearing_at(file) as hidden:
             encode(film, names, output, hidden)
             if output.verify and not (output.sheet and suffix_of(path) != EXR):
+                from defshade_cli.image.verification import verify
+
                 verify(hidden, film, names, output)
     return tuple(files)
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.image.layers import BEAUTY, LAYERS, Layer
 from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.scene.camera import Camera

@@ -5,12 +5,12 @@ from __future__ import annotations
 import base64
 import tempfile
 import zlib
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.image.colour import Pixels
 
 

@@ -7,14 +7,16 @@ import math
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from defshade_cli.image.texture import Source, TexelImage, load_images
-from defshade_cli.image.transfer import linear
 from defshade_cli.scene.light import Light, RectLight
-from defshade_cli.scene.radiance_map import RadianceMap
 from defshade_cli.scene.texture import ImageFile
+
+if TYPE_CHECKING:
+    from defshade_cli.image.texture import TexelImage
+    from defshade_cli.scene.radiance_map import RadianceMap
 
 log = logging.getLogger("defshade")
 
@@ -37,6 +39,9 @@ def read_radiance_map(file: ImageFile) -> RadianceMap | None:
 
 @lru_cache(maxsize=8)
 def _read(file: ImageFile, _changed: int) -> RadianceMap | None:
+    from defshade_cli.image.texture import Source, load_images
+    from defshade_cli.scene.radiance_map import RadianceMap
+
     source = Source(file, "auto")
     images = load_images({source: math.inf})
     return RadianceMap(_linear(images[source])) if source in images else None
@@ -47,5 +52,7 @@ def _linear(image: TexelImage) -> np.ndarray:
     texels = image.texels.astype(np.float32) / (255.0 if image.texels.dtype == np.uint8 else 1.0)
     colors = texels[::-1, :, :3] if texels.shape[2] >= 3 else np.repeat(texels[::-1, :, :1], 3, axis=2)
     if image.srgb:
+        from defshade_cli.image.transfer import linear
+
         colors = linear(colors)
     return np.maximum(colors, 0.0)

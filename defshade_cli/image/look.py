@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.image.colour import DisplayTransform, Pixels, picture
 from defshade_cli.image.false_colour import colors_of_ids
 from defshade_cli.image.film import Film

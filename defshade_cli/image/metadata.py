@@ -17,13 +17,11 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterable, Iterator
-from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from defshade_cli import __version__
-from defshade_cli.image.cryptomatte import cryptomatte_header
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import Layer
 from defshade_cli.scene.camera import Camera
@@ -72,6 +70,8 @@ def _manifest(layer: Layer, names: dict[int, str]) -> Iterator[Attribute]:
     if layer.source != "matte":
         yield Attribute(f"{PREFIX}{layer.name}/manifest", "string", json.dumps(names))
         return
+    from defshade_cli.image.cryptomatte import cryptomatte_header
+
     for key, value in cryptomatte_header(layer.exr_name, names).items():
         yield Attribute(key, "string", value)
 
@@ -112,6 +112,8 @@ def read_provenance(header: Iterable[tuple[str, Any]]) -> dict[str, Any]:
 
 def frame_rate(frames_per_second: float) -> tuple[int, int]:
     """(numerator, denominator), with NTSC's rates (24000/1001 …) found behind their decimals."""
+    from fractions import Fraction
+
     ntsc = Fraction(round(frames_per_second * 1.001) * 1000, 1001)
     exact = ntsc if abs(float(ntsc) - frames_per_second) < 5e-4 else Fraction(frames_per_second)
     rate = exact.limit_denominator(1001)

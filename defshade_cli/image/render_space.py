@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from defshade_cli.dataclass import dataclass
 
 Matrix3 = tuple[tuple[float, ...], ...]
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import OutputError, UsageError
 from defshade_cli.image.colour import Pixels
 from defshade_cli.image.compare import is_picture

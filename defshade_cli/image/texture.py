@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import PurePath
 from typing import Any, NamedTuple, TypeVar
 
@@ -20,6 +20,7 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.image.reduction import reduced, resampled
 from defshade_cli.image.render_space import LINEAR_REC709
 from defshade_cli.image.transfer import linear

@@ -9,13 +9,14 @@ from __future__ import annotations
 import hashlib
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from defshade_cli import resources
+from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.compare import Comparison, compare
 from defshade_cli.measure.layouts import first_frame, replace_generated

@@ -8,11 +8,11 @@ constants of `E_bound` in shaders/lib/brdf.glsl and defshade_cli/measure/brdf.py
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import linprog
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.measure.brdf import Array, EdgeFit, V_SmithGGXCorrelated, V_SmithSchlick, edge_bound
 from defshade_cli.measure.furnace import fibonacci_lattice, spherical
 from defshade_cli.settings import SHADINGS, Shading

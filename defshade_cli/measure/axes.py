@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from html import escape
+
+from defshade_cli.dataclass import dataclass
 
 WIDTH, HEIGHT, MARGIN = 720.0, 440.0, 64.0
 """Of a plot, in pixels."""

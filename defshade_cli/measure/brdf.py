@@ -7,11 +7,11 @@ from the surface, cosines are (...,), colours are (..., 3); everything broadcast
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.settings import Shading
 from defshade_cli.spaces import normalize
 

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import DefshadeError
 from defshade_cli.measure.mitsuba_plugins import mi
 from defshade_cli.measure.pathtraced_lights import emitter, transform, vector

@@ -107,8 +107,8 @@ def _texture(gpu: Gpu, values: NDArray[Any], *, smooth: bool) -> Texture:
     """(H, W, C) or (D, H, W, C)."""
     *shape, channels = values.shape
     make = gpu.context.texture if values.ndim == 3 else gpu.context.texture3d
-    data = np.ascontiguousarray(values, np.float32).tobytes()
-    texture = gpu.keep(make(tuple(reversed(shape)), channels, data, dtype="f4"))
+    kind = "f2" if values.dtype == np.float16 else "f4"
+    texture = gpu.keep(make(tuple(reversed(shape)), channels, np.ascontiguousarray(values).tobytes(), dtype=kind))
     texture.filter = (moderngl.LINEAR, moderngl.LINEAR) if smooth else (moderngl.NEAREST, moderngl.NEAREST)
     texture.repeat_x = texture.repeat_y = False
     if isinstance(texture, moderngl.Texture3D):

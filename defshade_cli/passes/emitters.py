@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.image.environment import sky_of
 from defshade_cli.passes.sampling import Sample, samples
 from defshade_cli.passes.shadow_atlas import AtlasRoom
@@ -18,14 +20,16 @@ from defshade_cli.passes.sky_guide import NO_GUIDES, SkyGuides
 from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.plan.points import share_shown
 from defshade_cli.scene.camera import Camera
-from defshade_cli.scene.distribution import GridDistribution
 from defshade_cli.scene.emission import Emitter, emitter_at, far_field, sky_emitter
 from defshade_cli.scene.environment import Environment
 from defshade_cli.scene.light import DomeLight, RectLight
 from defshade_cli.scene.mesh_light import MeshLight
-from defshade_cli.scene.radiance_map import RadianceMap
 from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import Window
+
+if TYPE_CHECKING:
+    from defshade_cli.scene.distribution import GridDistribution
+    from defshade_cli.scene.radiance_map import RadianceMap
 
 _MIDDLE = 0.0, 0.0, 0.5
 """Of a ball and of a cone of directions."""

@@ -7,8 +7,7 @@ draws the background, and the sky's image in lobes too sharp for them, as far as
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.outputs import output_defines, outputs_source
 from defshade_cli.gpu.planes import Plane, read_source

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from statistics import NormalDist
 
 from defshade_cli.settings import Filter
 
@@ -29,6 +28,8 @@ def _box(u: float) -> float:
 
 
 def _gaussian(u: float) -> float:
+    from statistics import NormalDist
+
     normal = NormalDist()
     low = normal.cdf(-_GAUSSIAN_ENDS)
     return normal.inv_cdf(low + u * (1.0 - 2.0 * low)) / (2.0 * _GAUSSIAN_ENDS)

@@ -6,12 +6,12 @@ A tile's box holds all that its pixels see, between its nearest and its farthest
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.plan.bounds import ROUNDING, LightBounds
+from defshade_cli.spaces import Window
 
 TILE = 32
 """Pixels a side."""
@@ -64,7 +64,7 @@ def _blocks(boxes: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np
 
 def tile_boxes(
     depths: NDArray[np.float64],
-    window: NDArray[np.float64],
+    window: Window,
     size: tuple[int, int],
     *,
     perspective: bool,

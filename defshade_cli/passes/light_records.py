@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,11 @@ from defshade_cli.passes.shadow_atlas import ShadowAtlas
 from defshade_cli.passes.tables import NO_TABLES, LightTables
 from defshade_cli.plan import PlannedLight
 from defshade_cli.scene.emission import Emitter
-from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import Light, Profile
 from defshade_cli.scene.shadow import PLAIN, ShadowStyle
+
+if TYPE_CHECKING:
+    from defshade_cli.scene.ies import IesProfile
 
 _PROFILES: tuple[Profile, ...] = ("uniform", "cosine", "sine")
 NO_CONE = 2.0 * math.pi

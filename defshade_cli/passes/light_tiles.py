@@ -25,12 +25,15 @@ from defshade_cli.passes.light_lists import TILE, list_lights, tile_boxes, tile_
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.light_traits import Traits, common_traits, lights_source
 from defshade_cli.passes.lighting import LightingVariant
+from defshade_cli.passes.sampling import Sample
 from defshade_cli.passes.screen import Screen, regions_of
 from defshade_cli.passes.shadow_atlas import ShadowAtlas, kind_of
 from defshade_cli.passes.tables import NO_TABLES, LightTables
+from defshade_cli.passes.view import placement, seen_window
 from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.plan.bounds import LightBounds
 from defshade_cli.settings import Layout
+from defshade_cli.spaces import inverse_rigid
 
 _MOST_LIGHTS = 256
 """A draw."""
@@ -48,15 +51,14 @@ class LightTiles:
         self._screen = Screen(gpu)
         self._array = cache(lambda variant, common: self._screen.array(_compile(gpu, variant, common, self._most)))
 
-    def begin(self, gbuffer: GBuffer, view: NDArray[Any], plan: Plan) -> None:
-        """What the tiles show, by the GBuffer and the View record (1,) that it was drawn with."""
+    def begin(self, gbuffer: GBuffer, plan: Plan, sample: Sample) -> None:
+        """What the tiles show, by the GBuffer of a sample."""
         self._plan, perspective = plan, plan.camera.projection == "perspective"
         ranges = self._depth_ranges(gbuffer.layout, perspective)
         depths = ranges.read(gbuffer, self._frame, plan.size)
         self._runs = self._frame.tile_runs(depths.shape[1::-1])
-        window = view["window"][0].astype(np.float64)
-        self._boxes = tile_boxes(depths, window, plan.size, perspective=perspective)
-        self._camera_from_relative = np.linalg.inv(view["relative_from_camera"][0].T.astype(np.float64))
+        self._boxes = tile_boxes(depths, seen_window(plan, sample), plan.size, perspective=perspective)
+        self._camera_from_relative = inverse_rigid(placement(plan.camera, sample))
 
     def add(
         self,

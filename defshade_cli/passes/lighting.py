@@ -8,10 +8,10 @@ plane would cut off.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import moderngl
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import DEPTH_CLAMP, Gpu
 from defshade_cli.gpu.outputs import output_defines, outputs_source
 from defshade_cli.gpu.planes import Plane, read_source, uses_standard_depth
@@ -22,7 +22,6 @@ from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.screen import Screen
 from defshade_cli.passes.shadow_atlas import ShadowAtlas, ShadowKind, shadow_source
 from defshade_cli.passes.tables import NO_TABLES, LightTables
-from defshade_cli.passes.volumes import cone_volume, sphere_volume
 from defshade_cli.plan import Plan, PlannedLight, Volume
 from defshade_cli.settings import Layout, Shading
 
@@ -172,6 +171,8 @@ class LightingPass:
 
 def volume_array(gpu: Gpu, volume: Volume, program: moderngl.Program) -> moderngl.VertexArray:
     """The polyhedron around a sphere or a cone, for a program that reads its `corner`s."""
+    from defshade_cli.passes.volumes import cone_volume, sphere_volume
+
     corners, triangles = sphere_volume() if volume == "sphere" else cone_volume()
     vertices = gpu.keep(gpu.context.buffer(corners.tobytes()))
     indices = gpu.keep(gpu.context.buffer(triangles.tobytes()))

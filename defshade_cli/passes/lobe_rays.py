@@ -8,22 +8,21 @@ for all lights.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import groupby
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import background_depth
 from defshade_cli.gpu.residence import BOXES, CELLS, LAMPS, TRIANGLES, RecordBuffer
 from defshade_cli.gpu.shaders import set_uniforms
 from defshade_cli.image.environment import sky_of
-from defshade_cli.passes.dome_program import DomeProgram
 from defshade_cli.passes.gbuffer import GBuffer
-from defshade_cli.passes.lamp_records import lamp_records
 from defshade_cli.passes.light_records import light_records
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.lighting import LightingVariant
@@ -36,7 +35,9 @@ from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.scene.emission import far_field
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
-from defshade_cli.scene.triangle_tree import TriangleTree, triangle_tree
+
+if TYPE_CHECKING:
+    from defshade_cli.scene.triangle_tree import TriangleTree
 
 
 class TreeStore:
@@ -50,6 +51,8 @@ class TreeStore:
     def update(self, scene: Scene) -> TriangleTree:
         """Make the scene's tree resident."""
         if self._tree is None or self._scene is None or not _is_placed_alike(self._scene, scene):
+            from defshade_cli.scene.triangle_tree import triangle_tree
+
             self._tree = triangle_tree(scene)
             self._boxes.write(in_texels(self._tree.boxes))
             self._triangles.write(in_texels(self._tree.edges))
@@ -84,6 +87,8 @@ class LampStore:
 
         Returns their Light records (N,), which are to be bound where rays are drawn.
         """
+        from defshade_cli.passes.lamp_records import lamp_records
+
         records, cells = lamp_records(plan.lamps, plan.samples, plan.camera.position, towards)
         self._lamps.write(records)
         self._cells.write(cells)
@@ -129,6 +134,8 @@ class SkyRaysPass:
     def __init__(
         self, gpu: Gpu, variant: LightingVariant, screen: Screen, textures: SkyTextures, *, hidden: bool
     ) -> None:
+        from defshade_cli.passes.dome_program import DomeProgram
+
         variant = replace(variant, ies=False, shaped=False)
         defines, generated = _sources(variant, ["HIDDEN"] * hidden)
         self._dome = DomeProgram(gpu, "lobe_rays.frag", defines, generated, screen, textures)

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import MOST_TARGETS, Plane
-from defshade_cli.gpu.residence import LIGHTS, MOTIONS, VIEW, DrawList, GpuScene, RecordBuffer
+from defshade_cli.gpu.residence import LIGHTS, MOTIONS, VIEW_BLOCK, DrawList, GpuScene, RecordBuffer
 from defshade_cli.image.film import Film, Sampling
 from defshade_cli.passes.accumulation import AccumulationPass
 from defshade_cli.passes.changed_tiles import beside, changed_tiles
@@ -30,7 +31,6 @@ from defshade_cli.passes.light_whole import WholeLighting
 from defshade_cli.passes.lighting import LightingPass, LightingVariant
 from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.lobe_rays import LampRaysPass, LampStore, LobeRays, SkyRaysPass, TreeStore, sky_densities
-from defshade_cli.passes.motion import motion_records, neighbouring_points
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
 from defshade_cli.passes.screen import Narrowing, Screen, TileMask
@@ -72,7 +72,7 @@ class Pipeline:
         gpu.make_current()
         self._scene = GpuScene(gpu)
         self._frame, self._scouted = Frame(gpu), Frame(gpu)
-        self._view = RecordBuffer(gpu, VIEW)
+        self._view = RecordBuffer(gpu, VIEW_BLOCK, uniform=True)
         self._lights = RecordBuffer(gpu, LIGHTS)
         self._motions = RecordBuffer(gpu, MOTIONS)
         self._screen, self._sharp, self._mask = Screen(gpu), Screen(gpu), TileMask(gpu)
@@ -162,6 +162,8 @@ class Pipeline:
         """The scene on the GPU, with what the plan's planes read of it."""
         moved: tuple[NDArray[np.float32], ...] = ()
         if "MOTION" in plan.inputs:
+            from defshade_cli.passes.motion import motion_records, neighbouring_points
+
             self._motions.write(motion_records(scene, plan))
             moved = tuple(neighbouring_points(scene))
         return self._scene.update(scene, plan.inputs, moved, plan.primvars, plan.texels, plan.thin)
@@ -231,7 +233,7 @@ class Pipeline:
         variant = LightingVariant.of(plan)
         self._emission_pass(variant).draw(gbuffer, targets)
         if plan.lighting == "tiles":
-            self._light_tiles.begin(gbuffer, view_record(plan, gbuffer.layout, sample), plan)
+            self._light_tiles.begin(gbuffer, plan, sample)
         openness = self._sky_visibility_pass(variant) if visibility else None
         if openness and visibility:
             openness.begin_sample(visibility)

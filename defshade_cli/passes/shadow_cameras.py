@@ -7,11 +7,11 @@ the six faces of a cube.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.camera import Camera, Projection
 from defshade_cli.scene.emission import Emitter
 from defshade_cli.scene.light import Shaping

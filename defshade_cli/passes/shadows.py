@@ -6,13 +6,14 @@ Maps are moved by a fraction of a texel every sample, so that their grid average
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.residence import SHADOW_BLOCK, DrawList, RecordBuffer

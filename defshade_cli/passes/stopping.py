@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +13,13 @@ from numpy.typing import NDArray
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.film import Sampling, StopReason
 from defshade_cli.passes.accumulation import AccumulationPass
-from defshade_cli.passes.batch_means import BatchMeansPass
 from defshade_cli.passes.convergence import FEWEST, TILE, Convergence
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.screen import Narrowing, Screen
 from defshade_cli.plan import Plan
+
+if TYPE_CHECKING:
+    from defshade_cli.passes.batch_means import BatchMeansPass
 
 
 class Stopping:
@@ -27,6 +30,8 @@ class Stopping:
 
     @cached_property
     def _batches(self) -> BatchMeansPass:
+        from defshade_cli.passes.batch_means import BatchMeansPass
+
         return BatchMeansPass(self._gpu, self._frame, self._screen)
 
     def begin(self, plan: Plan) -> None:

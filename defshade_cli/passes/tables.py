@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.residence import LINKS, RecordBuffer
 from defshade_cli.passes.linking import NOTHING_LINKED, LinkBits, link_bits
 from defshade_cli.plan import Plan
-from defshade_cli.scene.ies import IesProfile
+
+if TYPE_CHECKING:
+    from defshade_cli.scene.ies import IesProfile
 
 _ROWS, _COLUMNS = 721, 721
 """Every quarter of a degree vertically and half a degree around: what files give, and exact between."""

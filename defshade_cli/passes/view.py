@@ -20,15 +20,12 @@ from defshade_cli.spaces import Matrix, Window, inverse_rigid, rigid
 def view_record(plan: Plan, layout: Layout, sample: Sample = CENTRE) -> NDArray[Any]:
     """(1,) View of one sample: its place in the pixel moves the window, its place on the lens the eye."""
     camera, standard = plan.camera, uses_standard_depth(layout)
-    lens = lens_offset(camera, sample.lens)
-    window = _seen_from(lens, camera, _jittered(camera.window, plan.size, sample.pixel))
-    relative_from_camera = rigid(camera.world_from_camera)
-    relative_from_camera[:3, 3] = relative_from_camera[:3, :3] @ lens
+    window, relative_from_camera = seen_window(plan, sample), placement(camera, sample)
     view = np.zeros(1, record("View"))
     clip_from_relative = clip_from_camera(camera, window, plan.clip, standard) @ inverse_rigid(relative_from_camera)
     view["clip_from_relative"] = clip_from_relative.T
     view["relative_from_camera"] = relative_from_camera.T
-    view["window"] = window
+    view["first"], view["right"], view["down"] = _rays(camera, window, plan.size)
     view["depth_coefficients"] = depth_coefficients(camera, plan.clip, standard)
     view["size"], view["origin"] = plan.size, plan.window.origin
     view["exposure"] = plan.exposure
@@ -38,6 +35,31 @@ def view_record(plan: Plan, layout: Layout, sample: Sample = CENTRE) -> NDArray[
     view["roughest_rays"] = plan.roughest_rays
     view["cell"] = sample.cell
     return view
+
+
+def placement(camera: Camera, sample: Sample) -> Matrix:
+    """(4, 4) relative from camera space: the eye at the sample's place on the lens."""
+    matrix = rigid(camera.world_from_camera)
+    matrix[:3, 3] = matrix[:3, :3] @ lens_offset(camera, sample.lens)
+    return matrix
+
+
+def seen_window(plan: Plan, sample: Sample) -> Window:
+    """What the sample's eye sees: moved with its place in the pixel, and sheared so that the plane of focus stays."""
+    lens, (left, right, bottom, top) = lens_offset(plan.camera, sample.lens), plan.camera.window
+    dx, dy = lens[:2] / plan.camera.focus_distance if lens.any() else (0.0, 0.0)
+    dx -= (sample.pixel[0] - 0.5) * (right - left) / plan.size[0]
+    dy -= (0.5 - sample.pixel[1]) * (top - bottom) / plan.size[1]
+    return left - dx, right - dx, bottom - dy, top - dy
+
+
+def _rays(camera: Camera, window: Window, size: tuple[int, int]) -> Matrix:
+    """(3, 3): from the eye to the top left, one unit ahead in perspective; and from pixel to pixel, right and down."""
+    left, right, bottom, top = window
+    ahead = -1.0 if camera.projection == "perspective" else 0.0
+    rays = [[left, top, ahead], [(right - left) / size[0], 0.0, 0.0], [0.0, (bottom - top) / size[1], 0.0]]
+    matrix: Matrix = np.array(rays) @ rigid(camera.world_from_camera)[:3, :3].T
+    return matrix
 
 
 def lens_offset(camera: Camera, u: tuple[float, float]) -> NDArray[np.float64]:
@@ -52,15 +74,6 @@ def lens_offset(camera: Camera, u: tuple[float, float]) -> NDArray[np.float64]:
         return np.zeros(3)
     r, angle = (a, math.pi / 4 * b / a) if abs(a) > abs(b) else (b, math.pi / 2 - math.pi / 4 * a / b)
     return radius * r * np.array([math.cos(angle), math.sin(angle), 0.0])
-
-
-def _seen_from(lens: NDArray[np.float64], camera: Camera, window: Window) -> Window:
-    """The window sheared so that the plane of focus stays where it is."""
-    if not lens.any():
-        return window
-    dx, dy = lens[:2] / camera.focus_distance
-    left, right, bottom, top = window
-    return left - dx, right - dx, bottom - dy, top - dy
 
 
 def clip_from_camera(camera: Camera, window: Window, clip: tuple[float, float], standard: bool) -> Matrix:
@@ -96,11 +109,3 @@ def camera_depth(
     linear = scale * stored.astype(np.float64) + offset
     depth = 1.0 / linear if camera.projection == "perspective" else linear
     return np.where(stored == (1.0 if standard else 0.0), np.inf, depth)
-
-
-def _jittered(window: Window, size: tuple[int, int], jitter: tuple[float, float]) -> Window:
-    """The window moved so that every pixel's centre falls on the sample's place; raster y points down."""
-    left, right, bottom, top = window
-    dx = (jitter[0] - 0.5) * (right - left) / size[0]
-    dy = (0.5 - jitter[1]) * (top - bottom) / size[1]
-    return left + dx, right + dx, bottom + dy, top + dy

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
+
+from defshade_cli.dataclass import dataclass
 
 ROUNDING = 1e-4
 """Relative, for what float32 rounds in the shaders."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.planes import PLANES
 from defshade_cli.plan.cost import covered_share
 

@@ -13,12 +13,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.image.light_texture import with_texture
 from defshade_cli.plan.groups import group_lights, light_groups, light_outputs
 from defshade_cli.plan.overlap import reaches_into_ball

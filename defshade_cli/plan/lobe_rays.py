@@ -16,7 +16,6 @@ import numpy as np
 from defshade_cli.plan.lights import PlannedLight
 from defshade_cli.plan.points import LARGE, apparent_size
 from defshade_cli.scene.environment import LUMINANCE
-from defshade_cli.scene.lamp import lamp_of
 from defshade_cli.scene.light import DistantLight, DomeLight, Light
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
@@ -63,6 +62,12 @@ def _domes(lights: Iterable[PlannedLight], scene: Scene, settings: RenderSetting
     return [dome for dome in domes if _is_plainly_hidden(dome.light, scene, settings, MOST_TRIANGLES)]
 
 
+def _is_lamp(light: Light) -> bool:
+    from defshade_cli.scene.lamp import lamp_of
+
+    return lamp_of(light, np.zeros(3)) is not None
+
+
 def _lamps(lights: Iterable[PlannedLight], scene: Scene, settings: RenderSettings) -> list[PlannedLight]:
     few = min(MOST_TRIANGLES, TRIANGLES_A_SAMPLE * settings.most_samples)
     least = max(narrowest_lobe(scene.materials) * NARROW, LARGE if settings.most_samples == 1 else 0.0)
@@ -72,7 +77,7 @@ def _lamps(lights: Iterable[PlannedLight], scene: Scene, settings: RenderSetting
         if planned.points * settings.most_samples > 1
         and not planned.is_whole
         and apparent_size(planned.light, scene.roomy_bounds) >= least
-        and lamp_of(planned.light, np.zeros(3)) is not None
+        and _is_lamp(planned.light)
         and _is_plainly_hidden(planned.light, scene, settings, few)
     ]
     return sorted(lamps, key=lambda planned: -_brightness(planned.light, scene))[:MOST_LAMPS]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import UsageError
 from defshade_cli.gpu.planes import MOST_PRIMVARS, MOST_TARGETS, Plane, named_planes, needed_planes
 from defshade_cli.image.layers import BEAUTY, LAYERS, PRIMVAR_FAMILY, resolve
@@ -27,7 +29,6 @@ from defshade_cli.plan.shadow_maps import count_maps, shadow_resolution
 from defshade_cli.plan.solidity import solid_materials
 from defshade_cli.plan.texels import seen_texels
 from defshade_cli.scene.camera import Camera, image_size
-from defshade_cli.scene.ies import IesProfile
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
@@ -38,6 +39,9 @@ from defshade_cli.scene.window import DataWindow, from_ndc
 from defshade_cli.settings import FILTERS, Complexity, Debug, Filter, Layout, Lighting, RenderSettings, Shading
 from defshade_cli.spaces import transform_points
 from defshade_cli.units import exposure_scale
+
+if TYPE_CHECKING:
+    from defshade_cli.scene.ies import IesProfile
 
 _MARGIN = 1e-3  # relative slack around bounds that float32 may round outwards
 

@@ -7,13 +7,13 @@ might, and then all of it is drawn.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.plan.shadow_reach import shadowed_boxes
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.geometry import Drawable, world_boxes
 from defshade_cli.scene.light import CylinderLight
 from defshade_cli.scene.scene import Scene
@@ -73,6 +73,8 @@ def _shadowed(
         return moved[:0]
     left, right, _, _ = plan.camera.window
     side = _SHADOW_PIXELS * (right - left) / plan.size[0]
+    from defshade_cli.plan.shadow_reach import shadowed_boxes
+
     return shadowed_boxes(scene, lights, plan.shadow_resolution, (moved.mean(axis=1), radii), side)
 
 

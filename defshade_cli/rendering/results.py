@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.image.film import Film
 from defshade_cli.plan import Plan
 

@@ -5,8 +5,7 @@ Where a part moves, the passes draw that part: plan/redrawing.py.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from defshade_cli.dataclass import dataclass
 from defshade_cli.farm.shots import Shot
 from defshade_cli.image.film import Film
 from defshade_cli.plan import Plan

@@ -6,12 +6,13 @@ import time
 from collections.abc import Generator, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing, contextmanager, nullcontext
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from defshade_cli import __version__
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import DefshadeError, UnsoundImage, UsageError
 from defshade_cli.farm.open_job import OpenJob
 from defshade_cli.farm.shots import Shot

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import UsageError
 from defshade_cli.scene.arrays import frozen
 from defshade_cli.spaces import ConformPolicy, Matrix, Window, conform_window, inverse_rigid

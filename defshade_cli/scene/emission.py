@@ -16,12 +16,13 @@ so that each of its points bears the same intensity L π R². A cylinder's point
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.scene.distribution import GridDistribution
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.environment import Environment, harmonics
 from defshade_cli.scene.light import (
     CylinderLight,
@@ -34,8 +35,10 @@ from defshade_cli.scene.light import (
     SphereLight,
 )
 from defshade_cli.scene.mesh_light import MeshLight
-from defshade_cli.scene.radiance_map import RadianceMap
 from defshade_cli.spaces import cofactors, is_similarity, normalize, transform_points
+
+if TYPE_CHECKING:
+    from defshade_cli.scene.distribution import GridDistribution
 
 Vector = NDArray[np.float64]
 Place = tuple[float, float, float]
@@ -177,7 +180,7 @@ def _patch(light: Light, u: Place, towards: Vector) -> _Patch | None:
             return _Patch(np.array([*_circle(u[1], r * math.sqrt(u[0])), 0.0]), _FORWARD, math.pi * r * r)
         case RectLight(width=w, height=h, radiance_map=None):
             return _Patch(np.array([(u[0] - 0.5) * w, (u[1] - 0.5) * h, 0.0]), _FORWARD, w * h)
-        case RectLight(width=w, height=h, radiance_map=RadianceMap() as shown):
+        case RectLight(width=w, height=h, radiance_map=shown) if shown is not None:
             (s, t), weight, density = shown.sample(u[:2])  # its top left is at (+X, +Y)
             return _Patch(np.array([(0.5 - s) * w, (0.5 - t) * h, 0.0]), _FORWARD, w * h / density, weight * density)
         case CylinderLight(radius=r, length=length):

@@ -7,15 +7,17 @@ from the left is +X, the top is +Y.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.arrays import frozen
-from defshade_cli.scene.distribution import GridDistribution
+
+if TYPE_CHECKING:
+    from defshade_cli.scene.distribution import GridDistribution
 
 SkyLayout = Literal["automatic", "latlong", "mirroredBall", "angular", "cubeMapVerticalCross"]
 """Of an image of the sky, by UsdLux's names."""
@@ -143,6 +145,8 @@ class Environment:
 
     @cached_property
     def _distribution(self) -> GridDistribution:
+        from defshade_cli.scene.distribution import GridDistribution
+
         return GridDistribution(self.power)
 
     @cached_property

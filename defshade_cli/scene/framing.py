@@ -6,11 +6,11 @@ The front is +Z where Y is up, and −Y where Z is up. From there an azimuth tur
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.camera import Camera
 from defshade_cli.spaces import Matrix, Window, translation
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import islice
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.arrays import frozen
 
 _TYPES = {1: "C", 2: "B", 3: "A"}

@@ -8,12 +8,12 @@ shaders/lib/lamps.glsl.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.emission import POINTS_BIAS, turn_towards
 from defshade_cli.scene.light import CylinderLight, DiskLight, DistantLight, Light, RectLight, SphereLight
 from defshade_cli.scene.radiance_map import RadianceMap

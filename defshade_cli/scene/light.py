@@ -13,21 +13,23 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.arrays import frozen
 from defshade_cli.scene.environment import Environment, SkyLayout
-from defshade_cli.scene.ies import IesProfile
-from defshade_cli.scene.linking import Links
-from defshade_cli.scene.radiance_map import RadianceMap
 from defshade_cli.scene.shadow import PLAIN, ShadowStyle
-from defshade_cli.scene.texture import ImageFile
 from defshade_cli.spaces import Matrix, normalize
+
+if TYPE_CHECKING:
+    from defshade_cli.scene.ies import IesProfile
+    from defshade_cli.scene.linking import Links
+    from defshade_cli.scene.radiance_map import RadianceMap
+    from defshade_cli.scene.texture import ImageFile
 
 Profile = Literal["uniform", "cosine", "sine"]
 _GAIN: dict[Profile, float] = {"uniform": 0.25, "cosine": 1.0, "sine": 1.0 / math.pi}

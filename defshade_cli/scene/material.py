@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.texture import TextureInput
 
 Color = tuple[float, float, float]

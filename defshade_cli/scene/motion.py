@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.geometry import Drawable, Mesh
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.arrays import frozen
 from defshade_cli.scene.distribution import GridDistribution
 from defshade_cli.scene.environment import LUMINANCE

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.geometry import Drawable, Mesh, enclose, world_boxes
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import Material
-from defshade_cli.scene.motion import Moment
 from defshade_cli.scene.texture import Texture
 from defshade_cli.scene.window import WHOLE_IMAGE
 from defshade_cli.spaces import ConformPolicy
+
+if TYPE_CHECKING:
+    from defshade_cli.scene.motion import Moment
 
 _GRID_BITS = 6
 """Steps of `roomy_bounds`: between a 64th and a 128th of the longest side."""

@@ -6,11 +6,11 @@ It turns with the camera, as if the asset turned in front of it, and grows with 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.environment import Environment
 from defshade_cli.scene.framing import rotation, world_from_front
 from defshade_cli.scene.light import DomeLight, Light, RectLight

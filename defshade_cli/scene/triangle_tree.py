@@ -7,11 +7,11 @@ shaders/lib/rays.glsl. Every level halves its nodes' triangles along the longest
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import transform_points
 

@@ -12,5 +12,5 @@ What prims are read as:
     materials/         what they are made of          lights/            what lights them
     camera, facing     who looks, and what turns to it                   drawables, palette   all of it as one Scene
 
-    values, color_space, xform   attributes as arrays      blame, garbage   why something failed; the search for cycles
+    values, color_space, xform   attributes as arrays      blame              why something failed
 """

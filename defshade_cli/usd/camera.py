@@ -15,7 +15,6 @@ from pxr import Gf, Sdf, Usd, UsdGeom
 
 from defshade_cli.errors import PrimNotFound, StageError
 from defshade_cli.scene.camera import Camera
-from defshade_cli.scene.framing import world_from_front
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.spaces import Window, rigid, translation
 from defshade_cli.usd.values import STANDS_NOWHERE, is_finite, within_reach
@@ -101,6 +100,8 @@ def framed_camera(bounds: NDArray[np.float64], up_axis: str) -> Camera:
     The front is +Z where Y is up, −Y where Z is up. The distance is usdrecord's (UsdAppUtilsFrameRecorder: half the
     diagonal of the front face fits the horizontal field of view), or what a tall box needs, which usdrecord crops.
     """
+    from defshade_cli.scene.framing import world_from_front
+
     box = bounds if np.isfinite(bounds).all() else np.array([[-0.5] * 3, [0.5] * 3])
     upright = world_from_front(up_axis)
     width, height, depth = np.abs((box[1] - box[0]) @ upright[:3, :3])

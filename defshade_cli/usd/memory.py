@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -54,7 +54,7 @@ class Memory:
 
     seen_from: for cards placed by their textures.
     as_cages: what is round is what Hydra draws of it: see gprims.read_solid, and facing.
-    kinds: of prims.  clipped: see stage.has_clips.
+    kinds: of prims.  clipped: see stage.has_clips.  instanced: are there native instances?
     xforms: USD's cache, which drops only what varies when its time is set.
     """
 
@@ -68,6 +68,7 @@ class Memory:
     ) -> None:
         self.kinds = Kinds()
         self.clipped = has_clips(stage)
+        self.instanced = bool(stage.GetPrototypes())
         self.xforms = UsdGeom.XformCache()
         self._stage, self._extras, self._as_cages = stage, extras, as_cages
         self._shapes = Shapes()
@@ -111,7 +112,7 @@ class Memory:
         """What a mesh says, to be looked into with others; None of one that is known, or to be read by itself."""
         if said.type_name != "Mesh" or self._extras.primvars or said.path in self._surfaces:
             return None
-        subsets = material_subsets(prim)
+        subsets = [] if said.is_leaf else material_subsets(prim)
         told = told_of(prim, said, time, self._color_of(prim, said, subsets, time))
         return told and Asked(prim, said, subsets, told)
 
@@ -159,7 +160,7 @@ class Memory:
 
     def _color_of(self, prim: Usd.Prim, said: Said, subsets: list[UsdGeom.Subset], time: Usd.TimeCode) -> str:
         """As _color_primvar; what follows from bindings alone is found once for all prims with the same."""
-        bindings = self._bound(said.path, prim, said.names).bindings
+        bindings = self._bound(said.path, prim, said).bindings
         if subsets:
             return self._color_primvar(prim, subsets, time)
         if bindings == NOTHING_BOUND:
@@ -200,7 +201,7 @@ class Memory:
         """Relationships do not vary over time."""
         return self._bound(str(path)).bindings
 
-    def _bound(self, path: str, prim: Usd.Prim | None = None, said: Collection[str] | None = None) -> Bound:
+    def _bound(self, path: str, prim: Usd.Prim | None = None, said: Said | None = None) -> Bound:
         """From the nearest prim above whose bindings are known, downwards. prim, said: of the path, where known."""
         known = self._bindings.get(path)
         if known is not None:

@@ -7,20 +7,19 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import cycle
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd
 
 from defshade_cli.errors import EmptyStage
+from defshade_cli.garbage import uncollected
 from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
-from defshade_cli.scene.framing import Framing, Held
 from defshade_cli.scene.geometry import Drawable, Mesh, enclose, world_boxes
 from defshade_cli.scene.light import Light
-from defshade_cli.scene.motion import Moment, moment_of
 from defshade_cli.scene.scene import Scene, Unsupported
-from defshade_cli.scene.studio import studio_lights
 from defshade_cli.scene.texture import SeenFrom
 from defshade_cli.scene.view import View
 from defshade_cli.settings import Complexity
@@ -29,8 +28,6 @@ from defshade_cli.usd.blame import blaming
 from defshade_cli.usd.camera import choose_camera, default_window, find_cameras, framed_camera, read_camera
 from defshade_cli.usd.drawables import Glowing, drawables_of
 from defshade_cli.usd.facing import PlacedSurface, faced
-from defshade_cli.usd.garbage import uncollected
-from defshade_cli.usd.identity import read_assets, read_labels
 from defshade_cli.usd.instancing.instancing import Piece
 from defshade_cli.usd.lights.light import camera_light
 from defshade_cli.usd.lights.linking import link
@@ -47,6 +44,10 @@ from defshade_cli.usd.surfaces.extent import extents_of
 from defshade_cli.usd.surfaces.geometry import Gprim, Surface
 from defshade_cli.usd.surfaces.tessellation import Tessellation
 from defshade_cli.usd.traversal import Traversal
+
+if TYPE_CHECKING:
+    from defshade_cli.scene.framing import Framing, Held
+    from defshade_cli.scene.motion import Moment
 
 log = logging.getLogger("defshade")
 
@@ -152,6 +153,8 @@ class StageReader:
 
     def _moment(self, scene: Scene, frame: float, levels: dict[str, int]) -> Moment:
         """What `scene` has, as it is at another frame, refined alike."""
+        from defshade_cli.scene.motion import moment_of
+
         then = self._read(frame, Usd.TimeCode(frame), levels)
         return moment_of(scene.drawables, scene.meshes, then.camera, then.drawables, then.meshes)
 
@@ -195,11 +198,21 @@ class StageReader:
             pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
             data_window=self._settings.data_window,
-            labels=read_labels(self._stage, _paths(drawables), time) if self._extras.labels else {},
-            assets=read_assets(self._stage, _paths(drawables)) if self._extras.assets else {},
+            labels=self._labels(drawables, time) if self._extras.labels else {},
+            assets=self._assets(drawables) if self._extras.assets else {},
             purposes=self._purposes,
             rendering_space=self._settings.rendering_space,
         )
+
+    def _labels(self, drawables: Iterable[Drawable], time: Usd.TimeCode) -> Mapping[str, str]:
+        from defshade_cli.usd.identity import read_labels
+
+        return read_labels(self._stage, _paths(drawables), time)
+
+    def _assets(self, drawables: Iterable[Drawable]) -> Mapping[str, str]:
+        from defshade_cli.usd.identity import read_assets
+
+        return read_assets(self._stage, _paths(drawables))
 
     @cached_property
     def is_still(self) -> bool:
@@ -260,8 +273,11 @@ class StageReader:
         log.info(
             "no light that is supported: %s", "the studio lights it" if self._studio else "one shines from the camera"
         )
-        lights = studio_lights(scene) if self._studio else (camera_light(scene.camera),)
-        return replace(scene, lights=lights, lit_by="studio" if self._studio else "camera light")
+        if not self._studio:
+            return replace(scene, lights=(camera_light(scene.camera),), lit_by="camera light")
+        from defshade_cli.scene.studio import studio_lights
+
+        return replace(scene, lights=studio_lights(scene), lit_by="studio")
 
     def _view(self, camera: Camera) -> View:
         width, height = image_size(camera.aspect, self._size, self._width, self._settings.resolution)

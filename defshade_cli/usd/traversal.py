@@ -20,7 +20,6 @@ from defshade_cli.usd.blame import blamed
 from defshade_cli.usd.gprims.copies import Copies, once
 from defshade_cli.usd.instancing.instancing import Piece, Standing, finite, place
 from defshade_cli.usd.instancing.native_instances import NativeInstances
-from defshade_cli.usd.instancing.point_instancer import has_varying_copies, read_point_instancer
 from defshade_cli.usd.kind import Kind, Nature
 from defshade_cli.usd.lights.light import is_light, read_light
 from defshade_cli.usd.lights.mesh_light import Glow
@@ -125,13 +124,16 @@ class Traversal:
             pieces.append(self._stand_in(prim, here))
             return (), here
         pieces += self._own_pieces(prim, kind, here, said)
-        if self._is_hidden(prim) and (kind is Kind.POINT_INSTANCER or prim.IsInstance()):
+        is_instance = self._memory.instanced and prim.IsInstance()
+        if self._is_hidden(prim) and (kind is Kind.POINT_INSTANCER or is_instance):
             return (), here
         if kind is Kind.POINT_INSTANCER:
             pieces.extend(self._point_instances(prim, here))
             return (), here
-        if prim.IsInstance() and not _is_rigged_from_above(prim, here):
+        if is_instance and not _is_rigged_from_above(prim, here):
             instances.add(prim, here)
+            return (), here
+        if said.is_leaf and not is_instance:
             return (), here
         chosen = Usd.TraverseInstanceProxies(predicate) if here.rig else predicate
         return prim.GetFilteredChildren(chosen), here
@@ -173,7 +175,7 @@ class Traversal:
         found: list[Piece | _Awaited | None] = []
         if self._is_hidden(prim):
             return []
-        if is_light(prim):
+        if is_light(said.schemas):
             found.append(self._light(prim, here))
         if kind is Kind.GPRIM and here.purpose in (None, *self._purposes):
             found.append(self._gprim(prim, here, said))
@@ -293,6 +295,8 @@ class Traversal:
             self._report(prim, *reasons)
 
     def _point_instances(self, prim: Usd.Prim, here: Standing) -> Iterator[Piece]:
+        from defshade_cli.usd.instancing.point_instancer import has_varying_copies, read_point_instancer
+
         swarm = read_point_instancer(prim, self._time, self._base)
         self._report(prim, *swarm.issues)
         self.dormant |= not swarm.placements and has_varying_copies(prim)

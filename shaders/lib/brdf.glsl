@@ -14,8 +14,8 @@ float D_GGX(float alpha, float NoH, vec3 n, vec3 h) {
 }
 
 #ifdef PATCHES
-float blurred_alpha(float alpha, float blur) {
-    return min(sqrt(alpha * alpha + blur), 1.0);
+float blurred_alpha_squared(float alpha, float blur) {
+    return min(alpha * alpha + blur, 1.0);
 }
 
 // GGX as a disc of slopes sees it, whose radius squared is `blur`. Over slopes GGX is the form factor between a patch and a plane
@@ -27,12 +27,12 @@ float D_blurred(float alpha, float blur, vec3 n, vec3 h) {
     float inward = sin2 - blur * cos2, outside = inward + a2;
     float across = sqrt(inward * inward + a2 * (2.0 * (sin2 + blur * cos2) + a2));
     float farther = across + abs(outside), squared = sin2 + cos2;
-    float share = outside > 0.0 ? 2.0 * alpha * alpha / farther : farther / (2.0 * blur * cos2 * cos2);
-    return squared * squared * share / (PI * across);
+    vec2 share = outside > 0.0 ? vec2(2.0 * alpha * alpha, farther) : vec2(farther, 2.0 * blur * cos2 * cos2);
+    return squared * squared * share.x / (PI * across * share.y);
 }
 #else
-float blurred_alpha(float alpha, float blur) {
-    return alpha;
+float blurred_alpha_squared(float alpha, float blur) {
+    return alpha * alpha;
 }
 
 float D_blurred(float alpha, float blur, vec3 n, vec3 h) {
@@ -41,8 +41,7 @@ float D_blurred(float alpha, float blur, vec3 n, vec3 h) {
 #endif
 
 // Heitz 2014, "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", G2 / (4 NoL NoV).
-float V_SmithGGXCorrelated(float NoV, float NoL, float alpha) {
-    float a2 = alpha * alpha;
+float V_SmithGGXCorrelated(float NoV, float NoL, float a2) {
     float lambda_v = NoL * sqrt(NoV * NoV * (1.0 - a2) + a2);
     float lambda_l = NoV * sqrt(NoL * NoL * (1.0 - a2) + a2);
     return 0.5 / (lambda_v + lambda_l);

@@ -105,9 +105,9 @@ vec3 irradiance_from(Light light, vec3 position, out vec3 l) {
         return light.intensity;
     }
     vec3 to_light = (light.is_whole != 0u ? light.centre : light.position) - position;
-    float distance_squared = dot(to_light, to_light);
-    l = to_light * inversesqrt(distance_squared);
+    float distance_squared = dot(to_light, to_light), per_distance = inversesqrt(distance_squared);
+    l = to_light * per_distance;
     if (distance_squared >= light.reach * light.reach) return vec3(0.0);
     vec3 from_point = light.is_whole != 0u ? normalize(light.position - position) : l;
-    return light.intensity * shaped(light, from_point) * (profile(light, -l) / distance_squared);
+    return light.intensity * shaped(light, from_point) * (profile(light, -l) * per_distance * per_distance);
 }

@@ -3,7 +3,9 @@
 struct View {
     mat4 clip_from_relative;
     mat4 relative_from_camera; // its offset: the sample's place on the lens
-    vec4 window;               // left, right, bottom, top on the plane one unit ahead
+    vec3 first;                // from the eye to the image's top left, one unit ahead in perspective
+    vec3 right;                // from a pixel to the next
+    vec3 down;
     vec2 depth_coefficients;   // camera depth z: 1 / z (perspective) or z (orthographic) = x * stored + y
     vec2 size;                 // pixels
     vec2 origin;               // of the first pixel in the display window

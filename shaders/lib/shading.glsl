@@ -23,24 +23,29 @@ vec3 likely(vec3 one, vec3 other) {
 }
 
 // How the normal changes from this pixel to the next, by that of its neighbours that is the less likely to lie beyond an edge.
-vec3 turn_along(vec3 normal, ivec2 pixel, ivec2 next) {
-    ivec2 last = ivec2(view.size) - 1;
-    vec3 ahead = read_planes(min(pixel + next, last)).normal - normal;
-    vec3 behind = normal - read_planes(max(pixel - next, ivec2(0))).normal;
-    bool is_first = any(lessThan(pixel - next, ivec2(0))), is_last = any(greaterThan(pixel + next, last));
-    return is_first ? ahead : is_last ? behind : likely(ahead, behind);
+// `within` is the change within its two by two pixels; the other neighbour is fetched.
+vec3 turn_along(vec3 normal, ivec2 pixel, ivec2 next, vec3 within) {
+    ivec2 last = ivec2(view.size) - 1, parity = pixel & next;
+    bool is_second = parity != ivec2(0);
+    ivec2 apart = is_second ? pixel + next : pixel - next, inside = clamp(apart, ivec2(0), last);
+    vec3 beyond = read_planes(inside).normal - normal;
+    if (!is_second) beyond = -beyond;
+    if (inside != apart) return within;
+    return !is_second && any(greaterThan(pixel + next, last)) ? beyond : likely(within, beyond);
 }
 
 // The normals of a sample's cell of its pixel, each of which stands for a disc as wide as its part of it; parts as large as the
 // narrowest lobe do. Cells tile pixels and shrink with the number of samples; a point in each would miss smaller highlights.
+// Not within a branch: pixels beside each other tell of their normals.
 void see_footprint(inout Surface s, ivec2 pixel) {
     float roughness = sharpest_roughness(s);
 #ifdef PLANE_WEIGHTS
     if (roughness <= SHARP) s.blur = view.cell.z * view.cell.w * min(s.turn, MOST_TURN) / 6.0;    // neighbours may lie behind
 #else
-    // A loop, since a software rasteriser executes what a branch leaves out.
-    for (bool is_sharp = roughness <= SHARP; is_sharp; is_sharp = false) {
-        vec3 x = turn_along(s.normal, pixel, ivec2(1, 0)), y = turn_along(s.normal, pixel, ivec2(0, 1));
+    vec3 x = dFdxFine(s.normal), y = dFdyFine(s.normal);
+    if (roughness <= SHARP) {
+        x = turn_along(s.normal, pixel, ivec2(1, 0), x);
+        y = turn_along(s.normal, pixel, ivec2(0, 1), y);
         float most = sqrt(min(1.0, MOST_TURN / max(turn_of(x, y), 1e-12)));
         x *= most;
         y *= most;

@@ -116,7 +116,7 @@ vec2 D_of(Surface s, vec3 h) {
 
 // G2 / (4 NoL NoV), in the sample's blur.
 float V_of(float alpha, Surface s, Angles a) {
-    return V_SmithGGXCorrelated(a.NoV, a.NoL, blurred_alpha(alpha, s.blur));
+    return V_SmithGGXCorrelated(a.NoV, a.NoL, blurred_alpha_squared(alpha, s.blur));
 }
 
 // UsdPreviewSurface as its schema describes it, but that no lobe leaves more light below it than it has not taken:
@@ -146,7 +146,7 @@ vec3 brdf_classic(Surface s, Angles a, vec3 h, vec3 response) {
     vec3 real_albedo = s.base - s.base * s.metallic;
     vec3 real_specular = mix(vec3(0.03), s.base, s.metallic);
     vec3 F = F_Schlick(real_specular, vec3(1.0), a.VoH);
-    vec3 specular = D_of(s, h).x * V_SmithSchlick(a.NoV, a.NoL, blurred_alpha(alpha, s.blur)) * F;
+    vec3 specular = D_of(s, h).x * V_SmithSchlick(a.NoV, a.NoL, sqrt(blurred_alpha_squared(alpha, s.blur))) * F;
     vec3 taken = max(specular, E_bound(real_specular, vec3(1.0), min(a.NoV, a.NoL), alpha, SMITH_SCHLICK));
     return real_albedo / PI * max(1.0 - taken, 0.0) * response.x + specular * response.y;
 }

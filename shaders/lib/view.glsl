@@ -1,6 +1,6 @@
 #include "lib/records.glsl"
 
-layout(std430, binding = 0) readonly buffer ViewBlock { View view; };
+layout(std140, binding = 2) uniform ViewBlock { View view; };
 
 // Unit vector from a relative position to the eye.
 vec3 direction_to_eye(vec3 position) {
@@ -23,12 +23,10 @@ float camera_depth(float stored) {
 
 // The relative position that a pixel sees at a camera depth. `pixel` is in raster space, its centre at .5.
 vec3 position_at(vec2 pixel, float depth) {
-    vec2 t = pixel / view.size;
-    vec2 p = vec2(mix(view.window.x, view.window.y, t.x), mix(view.window.w, view.window.z, t.y));
+    vec3 ray = view.first + pixel.x * view.right + pixel.y * view.down;
 #ifdef ORTHOGRAPHIC
-    vec3 position_camera = vec3(p, -depth);
+    return view.relative_from_camera[3].xyz + ray - depth * view.relative_from_camera[2].xyz;
 #else
-    vec3 position_camera = vec3(p * depth, -depth);
+    return view.relative_from_camera[3].xyz + depth * ray;
 #endif
-    return (view.relative_from_camera * vec4(position_camera, 1.0)).xyz;
 }

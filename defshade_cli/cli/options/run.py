@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
 from pathlib import Path
 
 import click
 
 from defshade_cli.cli.options.option import Function, Option
 from defshade_cli.cli.types import Whole
+from defshade_cli.dataclass import dataclass
 
 PROGRESS = ("auto", "bar", "alf", "openjd", "json", "none")
 

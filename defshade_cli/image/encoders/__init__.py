@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from defshade_cli.errors import UsageError
-from defshade_cli.image.encoders.exr import write_exr
 from defshade_cli.image.encoders.pictures import PICTURES, bits_of, write_picture, write_sheet
 from defshade_cli.image.film import Film
 from defshade_cli.settings import OutputSettings
@@ -49,6 +48,8 @@ def encode(film: Film, names: tuple[str, ...], output: OutputSettings, path: Pat
     Raises OSError with the reason, UsageError for a suffix, display or view that does not exist.
     """
     if suffix_of(path) == EXR:
+        from defshade_cli.image.encoders.exr import write_exr
+
         write_exr(film, names, output, path)
     elif output.sheet:
         write_sheet(film, names, output, path)

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.image.colour import Pixels
 from defshade_cli.image.encoders.sink import bounded, make_spec, opened, set_attributes
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import BEAUTY, MAIN_PART
 from defshade_cli.image.metadata import exr_attributes
+from defshade_cli.image.render_space import LINEAR_REC709
 from defshade_cli.settings import Compression, OutputSettings
+
+_DATA = "data"
+_INTEROP_IDS = (LINEAR_REC709, _DATA)
+"""Names of spaces that are their ids too. Where a header is given no id, OpenImageIO loads a config to look for it."""
 
 TILE = 64
 """Texels a side of a tile, as maketx has it."""
@@ -79,7 +84,10 @@ def _spec(film: Film, names: tuple[str, ...], halves: set[str], compression: Com
     spec.channelnames = channels
     if len(set(types)) > 1:
         spec.channelformats = tuple(oiio.TypeDesc(kind) for kind in types)
-    spec.set_colorspace(film.render_space.interop_id if any(film.row(name).is_color for name in names) else "data")
+    space = film.render_space.interop_id if any(film.row(name).is_color for name in names) else _DATA
+    spec.set_colorspace(space)
+    if space in _INTEROP_IDS:
+        spec.attribute("colorInteropID", space)
     spec.attribute("compression", _lossless_for_data(compression, film, names))
     set_attributes(spec, exr_attributes(film, names))
     return spec

@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.image.colour import Pixels, display_transform, picture
 from defshade_cli.image.encoders.sink import bounded, make_spec, opened, set_attributes
 from defshade_cli.image.film import Film
-from defshade_cli.image.look import look_at_film
 from defshade_cli.image.metadata import text_attributes
-from defshade_cli.image.sheet import contact_sheet
 from defshade_cli.settings import OutputSettings
 
 Hint = tuple[str, str | int]
 
 _DITHER_SEED = 1  # equal films, equal files
 
+
+_SRGB = "sRGB - Display"
 
 _UP = 0x20
 """libpng's PNG_FILTER_UP: one filter for all rows takes half the time of trying each, for files as small."""
@@ -32,6 +32,7 @@ _UP = 0x20
 class PictureFormat:
     """bits: a channel, the default first.  hints: attributes for the encoder.
 
+    implied: the colour space that the encoder writes for one that is not named. For a name it loads a whole config.
     fails_badly: on a full disk the encoder ends the process (libjpeg) or never returns (libwebp), so the space is
         claimed beforehand.
     """
@@ -39,6 +40,7 @@ class PictureFormat:
     bits: tuple[int, ...] = (8,)
     alpha: bool = True
     hints: tuple[Hint, ...] = ()
+    implied: str = ""
     fails_badly: bool = False
 
 
@@ -47,7 +49,7 @@ _TIFF = PictureFormat((16, 8), hints=(("compression", "zip"), ("Exif:ColorSpace"
 """Uncalibrated, unless the display is sRGB: an Exif block without any entry is reported as a failure."""
 
 PICTURES = {
-    ".png": PictureFormat((8, 16), hints=(("png:compressionLevel", 1), ("png:filter", _UP))),
+    ".png": PictureFormat((8, 16), hints=(("png:compressionLevel", 1), ("png:filter", _UP)), implied=_SRGB),
     ".jpg": _JPEG,
     ".jpeg": _JPEG,
     ".jxl": PictureFormat((8, 16), hints=(("compression", "jpegxl:100"),)),
@@ -70,13 +72,16 @@ def write_picture(film: Film, name: str, output: OutputSettings, path: Path) -> 
         shown = picture(layer, pixels, transform, alpha=form.alpha)
     bits = bits_of(path, output)
     spec = make_spec(film, shown.shape[-1], f"uint{bits}")
-    if layer.is_color:
+    if layer.is_color and transform.encoding != form.implied:
         spec.set_colorspace(transform.encoding)
     _write(shown, spec, film, path, dithered=output.dither and layer.is_color and bits == 8)
 
 
 def write_sheet(film: Film, names: tuple[str, ...], output: OutputSettings, path: Path) -> None:
     """Write all the layers as tiles of one picture. Raises as `write_picture`: OSError, UsageError."""
+    from defshade_cli.image.look import look_at_film
+    from defshade_cli.image.sheet import contact_sheet
+
     transform = display_transform(output.display, output.view, output.look, film.render_space)
     sheet = contact_sheet({name: look_at_film(film, name, transform) for name in names})
     height, width = sheet.shape[:2]

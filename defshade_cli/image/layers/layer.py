@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal, get_args
+
+from defshade_cli.dataclass import dataclass
 
 SampledSource = Literal["lighting", "coverage", "matte"]
 """Sources that are summed over samples; any other is a plane of the data GBuffer."""

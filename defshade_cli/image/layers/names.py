@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 
@@ -104,6 +103,8 @@ def _ours(name: str) -> str:
 
 def _guess(unknown: list[str]) -> str:
     """The names that nobody has, with what the first may have meant."""
+    import difflib
+
     close = difflib.get_close_matches(unknown[0], [*LAYERS, *ALIASES], 1) if unknown else []
     return (", ".join(unknown) or "(none given)") + (f" (did you mean '{close[0]}'?)" if close else "")
 

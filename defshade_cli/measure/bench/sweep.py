@@ -5,10 +5,11 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import product
 from pathlib import Path
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.farm.open_job import OpenJob
 from defshade_cli.image.compare import Comparison, compare
 from defshade_cli.image.film import Film

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.settings import Filter, Layout, RenderSettings
 
 Cost = Literal["wall", "cpu"]

@@ -7,10 +7,10 @@ import os
 import re
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import UsageError
 from defshade_cli.settings import Complexity
 from defshade_cli.spaces import ConformPolicy

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from typing import Any, Self
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.measure.conformance.catalogue import Case
 
 LEAST_IOU = 0.99

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from defshade_cli import resources
+from defshade_cli.dataclass import dataclass
 from defshade_cli.measure.fuzz.mutations import mutated
 from defshade_cli.usd.opening.conversion import write_as
 from defshade_cli.usd.opening.dependencies import read_dependencies

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.measure.stress.stage import StressStage
 from defshade_cli.settings import RenderSettings
 

@@ -6,12 +6,13 @@ after its last, 2 P₀ − P₁ and 2 Pₙ₋₁ − Pₙ₋₂.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.usd.polygons.polygons import Primvar
 from defshade_cli.usd.values import places_in_runs
 

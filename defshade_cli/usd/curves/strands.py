@@ -10,11 +10,10 @@ hdSt/basisCurves.cpp, hdSt/shaders/basisCurves.glslfx. From `veryhigh` on Hydra 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.view import View
 from defshade_cli.spaces import Matrix, cross, normalize, transform_directions, transform_points
 from defshade_cli.usd.curves.basis import (

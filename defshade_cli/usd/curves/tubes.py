@@ -8,11 +8,11 @@ at once (Hillis and Steele 1986).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.spaces import normalize
 from defshade_cli.usd.curves.basis import CurveSamples
 from defshade_cli.usd.polygons.polygons import Polygons, Primvar

@@ -10,7 +10,7 @@ NaN in arrays) and multiplies its matrices, in NumPy: instances of instances cos
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import chain, compress, repeat
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import StageError
 from defshade_cli.scene.light import Light
 from defshade_cli.usd.materials.binding import NOTHING_BOUND, Bindings

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.usd.instancing.instancing import Placement, read_display_of_instances
 from defshade_cli.usd.xform import matrices
 

@@ -7,7 +7,7 @@ read without them.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -58,9 +58,9 @@ _INPUTS = "inputs:"
 _WHITE = np.array(UsdLux.BlackbodyTemperatureAsRgb(6500.0))
 
 
-def is_light(prim: Usd.Prim) -> bool:
-    """By its type, or by what is applied to it: USD lists both, which is cheaper to ask than HasAPI."""
-    return "LightAPI" in prim.GetAppliedSchemas()
+def is_light(schemas: Sequence[str]) -> bool:
+    """By what is applied to a prim; USD lists what its type has among it."""
+    return "LightAPI" in schemas
 
 
 def read_light(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Light | Glow | None, tuple[Unsupported, ...]]:

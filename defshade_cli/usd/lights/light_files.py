@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from pxr import Ar, Sdf, Usd
 
-from defshade_cli.scene.ies import IesError, IesProfile, parse_ies
 from defshade_cli.scene.light import Light, RectLight
 from defshade_cli.usd.materials.texture import Unreadable, image_file
+
+if TYPE_CHECKING:
+    from defshade_cli.scene.ies import IesProfile
 
 
 def with_files(light: Light, prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Light, tuple[str, ...]]:
@@ -24,7 +27,7 @@ def with_files(light: Light, prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Light,
     if profile and light.shaping:
         try:
             light = replace(light, shaping=replace(light.shaping, ies=_read_profile(_resolved(profile))))
-        except (Unreadable, IesError) as problem:
+        except Unreadable as problem:
             lost.append(f"the profile {profile.path} is ignored: {problem}")
     return light, tuple(lost)
 
@@ -42,7 +45,12 @@ def _resolved(asset: Sdf.AssetPath) -> str:
 
 
 def _read_profile(resolved: str) -> IesProfile:
+    from defshade_cli.scene.ies import IesError, parse_ies
+
     asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(resolved))
     if not asset:
         raise Unreadable("it cannot be opened")
-    return parse_ies(bytes(asset.GetBuffer()).decode("latin-1"))
+    try:
+        return parse_ies(bytes(asset.GetBuffer()).decode("latin-1"))
+    except IesError as problem:
+        raise Unreadable(str(problem)) from problem

@@ -8,11 +8,12 @@ tints the light, and the surface is seen as the material has it; a surface witho
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from pxr import Usd, UsdGeom, UsdLux
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import UNBOUND, Material
 from defshade_cli.scene.mesh_light import MeshLight

@@ -7,15 +7,19 @@ of the instance by the same rule: the nearest wins, unless one from above is str
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from pxr import Sdf, Usd, UsdShade
+
+from defshade_cli.usd.said import Said, binding_names
 
 PURPOSES = ("full", "preview", "")
 """Of bindings, in order of preference where render settings have none; the empty name is for all purposes."""
 
 _DIRECT = str(UsdShade.Tokens.materialBinding)
+_ONLY_DIRECT = (_DIRECT,)
+_BINDING_API = "MaterialBindingAPI"
 
 
 class Binding(NamedTuple):
@@ -67,33 +71,31 @@ class Bound(NamedTuple):
 NOTHING_ABOVE = Bound(NOTHING_BOUND, by_collection=False, by_purpose=False)
 
 
-Known = dict[Sdf.Path, tuple[Binding, Binding] | None]
-"""Materials by path: their bindings, weaker and stronger than descendants; None for what is no material."""
+Known = dict[Sdf.Path, tuple[Bound, Bound] | None]
+"""Materials by path: what binds them, weaker and stronger than descendants; None for what is no material."""
 
 
-def read_bound(prim: Usd.Prim, above: Bound, known: Known, said: Collection[str] | None = None) -> Bound:
+def read_bound(prim: Usd.Prim, above: Bound, known: Known, said: Said | None = None) -> Bound:
     """Of a prim whose parent has `above`: the same, unless it has bindings of its own or a collection may hold it.
 
-    said: names of the properties authored on it, where they are known.  known: takes what is found.
+    said: of the prim, where it is known.  known: takes what is found.
     """
-    if said is None:
-        said = prim.GetAuthoredPropertyNames()
-    own = [name for name in said if name.startswith("material:")]
+    own = binding_names(prim.GetAuthoredPropertyNames()) if said is None else said.binding
     if not own and not above.by_collection:
         return above
-    if own == [_DIRECT] and not (above.by_collection or above.by_purpose):
-        direct = _direct(prim, known)
+    if own == _ONLY_DIRECT and not (above.by_collection or above.by_purpose):
+        direct = _direct(prim, prim.GetAppliedSchemas() if said is None else said.schemas, known)
         if direct:
-            bindings = Bindings(all_purpose=_stronger(direct, above.bindings.all_purpose))
-            return Bound(bindings, by_collection=False, by_purpose=False)
+            there = above.bindings.all_purpose
+            return above if there and there.stronger else direct
     by_collection = above.by_collection or any(":collection:" in name for name in own)
     by_purpose = above.by_purpose or any(":full" in name or ":preview" in name for name in own)
     return Bound(_resolve(prim, by_purpose=by_purpose), by_collection, by_purpose)
 
 
-def _direct(prim: Usd.Prim, known: Known) -> Binding | None:
+def _direct(prim: Usd.Prim, schemas: Sequence[str], known: Known) -> Bound | None:
     """The one material that a relationship of the prim's own binds; None where it is for USD to say what holds."""
-    if not prim.HasAPI(UsdShade.MaterialBindingAPI):
+    if _BINDING_API not in schemas:
         return None
     relationship = prim.GetRelationship(_DIRECT)
     targets = relationship.GetTargets()
@@ -103,10 +105,15 @@ def _direct(prim: Usd.Prim, known: Known) -> Binding | None:
     if target not in known:
         material = prim.GetStage().GetPrimAtPath(target)
         is_one = bool(material) and material.IsA(UsdShade.Material)
-        known[target] = (Binding(target, stronger=False), Binding(target, stronger=True)) if is_one else None
-    bindings = known[target]
+        known[target] = (_bound_to(target, stronger=False), _bound_to(target, stronger=True)) if is_one else None
+    bound = known[target]
     strength = UsdShade.MaterialBindingAPI.GetMaterialBindingStrength(relationship)
-    return bindings and bindings[strength == UsdShade.Tokens.strongerThanDescendants]
+    return bound and bound[strength == UsdShade.Tokens.strongerThanDescendants]
+
+
+def _bound_to(material: Sdf.Path, *, stronger: bool) -> Bound:
+    """For all purposes."""
+    return Bound(Bindings(all_purpose=Binding(material, stronger)), by_collection=False, by_purpose=False)
 
 
 def _resolve(prim: Usd.Prim, *, by_purpose: bool) -> Bindings:

@@ -10,12 +10,13 @@ of which nothing is lost.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from typing import Any
 
 import numpy as np
 from pxr import Sdf, Usd, UsdShade
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.material import TEXTURED_FIELDS, UNBOUND, UV_SETS, Material
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.scene.texture import TextureInput

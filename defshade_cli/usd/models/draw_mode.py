@@ -17,7 +17,6 @@ from defshade_cli.scene.scene import Unsupported
 from defshade_cli.scene.texture import SeenFrom
 from defshade_cli.usd.gprims.copies import bars
 from defshade_cli.usd.materials.material import ReadMaterial
-from defshade_cli.usd.models.cards import UNTEXTURED, read_card_material, read_cards
 from defshade_cli.usd.polygons.polygons import Polygons
 from defshade_cli.usd.polygons.subsets import Faces
 from defshade_cli.usd.surfaces.geometry import Surface
@@ -76,6 +75,8 @@ class StandIns:
             return _surface(path, (), _bar(), None, ["it has no bounds to draw"])
         if mode != UsdGeom.Tokens.cards:
             return _lines(path, box, _EDGES)
+        from defshade_cli.usd.models.cards import read_cards
+
         polygons, names, group = read_cards(prim, box, issues, self._seen_from)
         return _surface(path, names, polygons, group, issues)
 
@@ -89,6 +90,8 @@ def read_material(stage: Usd.Stage, path: Sdf.Path, shown_as: str) -> ReadMateri
 
     A card's by its texture; lines and cards without texture have the draw mode's colour, and lines shine by themselves.
     """
+    from defshade_cli.usd.models.cards import UNTEXTURED, read_card_material
+
     prim = stage.GetPrimAtPath(path.GetPrimPath())
     r, g, b = UsdGeom.ModelAPI(prim).GetModelDrawModeColorAttr().Get() or _NO_COLOR
     color = (float(r), float(g), float(b))

@@ -6,13 +6,14 @@ Tiller, "The NURBS Book", 4.5). Control points run along U first, as Hydra and R
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.usd.nurbs.trim import TRIM_ATTRIBUTES, inside, read_loops
 from defshade_cli.usd.polygons.normals import mend_normals
 from defshade_cli.usd.polygons.polygons import Polygons, Primvar

@@ -9,8 +9,6 @@ from pxr import Sdf, Tf, Usd
 from defshade_cli.errors import StageError, StageNotFound
 from defshade_cli.settings import Composition
 from defshade_cli.usd.opening.diagnostics import commentary
-from defshade_cli.usd.opening.mask import add_what_is_referred_to, limited_to
-from defshade_cli.usd.opening.variants import choose_variant
 
 
 def compose(path: Path, composition: Composition, camera: str | None) -> Usd.Stage:
@@ -28,6 +26,17 @@ def compose(path: Path, composition: Composition, camera: str | None) -> Usd.Sta
 
 def _composed(root: Sdf.Layer, session: Sdf.Layer, composition: Composition, camera: str | None) -> Usd.Stage:
     load = Usd.Stage.LoadNone if composition.payloads == "none" else Usd.Stage.LoadAll
+    if composition.mask or composition.variants:
+        return _limited(root, session, composition, camera, load)
+    return Usd.Stage.Open(root, session, load)
+
+
+def _limited(
+    root: Sdf.Layer, session: Sdf.Layer, composition: Composition, camera: str | None, load: Usd.Stage.InitialLoadSet
+) -> Usd.Stage:
+    from defshade_cli.usd.opening.mask import add_what_is_referred_to, limited_to
+    from defshade_cli.usd.opening.variants import choose_variant
+
     if composition.mask:
         stage = Usd.Stage.OpenMasked(root, session, limited_to(composition.mask, camera), load)
     else:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 from pathlib import Path
 
 from pxr import Ar, Sdf, Tf, UsdUtils
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import StageError
-from defshade_cli.usd.materials.materialx.document import source_of
 from defshade_cli.usd.materials.materialx.documents import files_of
 
 
@@ -33,7 +32,7 @@ def read_dependencies(stage: Path) -> Dependencies:
         raise StageError(f"{stage} depends on a layer that cannot be read") from error
     finally:
         del delegate
-    documents = {name: source_of(name) for name in missing}
+    documents = {name: _source_of(name) for name in missing}
     named = [*(layer.realPath for layer in layers), *assets, *documents.values()]
     paths = {_outermost(path) for path in (*named, *files_of(named)) if path}
     folder = stage.resolve().parent
@@ -42,6 +41,12 @@ def read_dependencies(stage: Path) -> Dependencies:
     return Dependencies(
         files, tuple(sorted({*(name for name, document in documents.items() if not document), *elsewhere}))
     )
+
+
+def _source_of(name: str) -> str:
+    from defshade_cli.usd.materials.materialx.document import source_of
+
+    return source_of(name)
 
 
 def _outermost(path: str) -> str:

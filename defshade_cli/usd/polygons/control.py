@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast, get_args
 from weakref import WeakValueDictionary
 
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.usd.polygons.polygons import Polygons
 from defshade_cli.usd.said import Said
 from defshade_cli.usd.values import floats, integers

@@ -84,7 +84,7 @@ def blocks(items: Sequence[T], corners: Sequence[int], at_once: int = CORNERS_AT
     """Runs of the items, none of much more corners than `at_once` unless one item has them. corners: of each."""
     ends = np.cumsum(corners)
     firsts = np.searchsorted(ends, np.arange(0, ends[-1], at_once), "right")
-    for first, end in pairwise([*np.unique(firsts).tolist(), len(items)]):
+    for first, end in pairwise([*dict.fromkeys(firsts.tolist()), len(items)]):
         yield items[first:end]
 
 

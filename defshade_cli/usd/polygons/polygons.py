@@ -7,13 +7,15 @@ takes and gives it. A corner is one face-vertex.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from hashlib import blake2b
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from defshade_cli.dataclass import dataclass
 
 Interpolation = Literal["constant", "uniform", "varying", "vertex", "faceVarying"]
 Scheme = Literal["none", "bilinear", "catmullClark", "loop"]

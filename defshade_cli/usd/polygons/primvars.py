@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import NamedTuple, cast
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.usd.color_space import in_rec709, is_color
 from defshade_cli.usd.polygons.polygons import Interpolation, Polygons, Primvar
 from defshade_cli.usd.values import floats, integers

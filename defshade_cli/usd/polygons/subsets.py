@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom, UsdShade
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.usd.values import integers
 

@@ -118,9 +118,7 @@ def _normals(prim: Usd.Prim, said: Said, time: Usd.TimeCode) -> Lying | None:
 def _carried(prim: Usd.Prim, said: Said, time: Usd.TimeCode, color: str) -> tuple[Lying, ...] | None:
     """Colour, opacity and texture coordinates of the prim's own; None where there is more to them."""
     found = []
-    for name in said.names:
-        if not name.startswith(_PRIMVARS) or name.endswith(_INDICES) or name == "primvars:normals":
-            continue
+    for name in said.lying:
         attribute = prim.GetAttribute(name)
         value = attribute.Get(time) if attribute else None
         type_name = None if isinstance(value, Vt.Vec2fArray) else attribute and attribute.GetTypeName()
@@ -133,7 +131,7 @@ def _carried(prim: Usd.Prim, said: Said, time: Usd.TimeCode, color: str) -> tupl
         if not isinstance(value, expected) or not value or not isinstance(indices, Vt.IntArray):
             return None
         colors = in_rec709(attribute, value) if type_name in _COLORS else value
-        interpolation = attribute.GetMetadata("interpolation") or UsdGeom.Tokens.constant
+        interpolation = UsdGeom.Primvar(attribute).GetInterpolation()
         chosen = None if indices is _NO_INDICES else np.asarray(indices)
         found.append(Lying(field, name[len(_PRIMVARS) :], np.asarray(colors), interpolation, chosen))
     return tuple(found)

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.spaces import cross
-from defshade_cli.usd.polygons.ears import clip_ears
 from defshade_cli.usd.polygons.normals import vector_areas
 from defshade_cli.usd.polygons.polygons import Polygons
 
@@ -82,6 +81,8 @@ def _cut_large(corners: NDArray[np.float64]) -> NDArray[np.intp]:
     convex = (behind[..., 0] * ahead[..., 1] > behind[..., 1] * ahead[..., 0]).all(axis=1)
     clipped = ~convex & areas.any(axis=1)
     if clipped.any() and size <= LARGEST_CLIPPED:
+        from defshade_cli.usd.polygons.ears import clip_ears
+
         triangles[clipped] = clip_ears(uv[clipped])
     return triangles
 

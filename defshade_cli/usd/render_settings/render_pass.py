@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from pxr import Sdf, Usd, UsdRender
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.scene import Unsupported
 
 _UNANSWERED = ("cameraVisibility", "matte")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 from pxr import Gf, Sdf, Tf, Usd, UsdRender, Vt
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import OutputError
 from defshade_cli.scene.product import Variable
 from defshade_cli.usd.render_settings.products import find_settings

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from pxr import Usd, UsdRender
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.window import WHOLE_IMAGE
 from defshade_cli.spaces import ConformPolicy

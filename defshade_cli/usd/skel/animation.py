@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdSkel
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.usd.xform import matrices
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import UsdSkel, Vt
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.usd.values import floats, integers
 
 if TYPE_CHECKING:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdSkel
+
+from defshade_cli.dataclass import dataclass
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix

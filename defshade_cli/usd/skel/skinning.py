@@ -6,13 +6,13 @@ are UsdSkel's, for which UsdSkelSkinPoints is the reference.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.usd.skel.influences import Influences
 
 Points = NDArray[np.float64]

@@ -7,12 +7,13 @@ and bilinear) the face points.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
+from defshade_cli.dataclass import dataclass
 
 Indices: TypeAlias = NDArray[np.int32]
 

@@ -8,11 +8,10 @@ mask that follows, by the sharpness that is left.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.usd.subdivision.cage import Cage, decayed
 from defshade_cli.usd.subdivision.stencil import Entries
 

@@ -7,12 +7,13 @@ Face-varying interpolation rules").
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.usd.subdivision.base import base_cage, smooth_edges
 from defshade_cli.usd.subdivision.cage import INFINITE, Cage, Indices, find_edges
 from defshade_cli.usd.subdivision.fans import walk

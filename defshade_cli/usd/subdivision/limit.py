@@ -10,12 +10,12 @@ across the edge all the same.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.spaces import normalize
 from defshade_cli.usd.subdivision.cage import Cage, Indices
 from defshade_cli.usd.subdivision.creases import SMOOTH, vertex_rules

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.usd.subdivision.base import base_cage, hole_faces
 from defshade_cli.usd.subdivision.cage import Cage, Indices
 from defshade_cli.usd.subdivision.schemes import Scheme, linear_scheme_of, scheme_of

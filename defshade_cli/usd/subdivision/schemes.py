@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.usd.subdivision import bilinear, catmull_clark, loop
 from defshade_cli.usd.subdivision.cage import Cage
 from defshade_cli.usd.subdivision.stencil import Masks, identity

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import reduce
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from defshade_cli.dataclass import dataclass
 
 if TYPE_CHECKING:  # scipy is a quarter of a second to import, and not every stage is subdivided
     from scipy import sparse

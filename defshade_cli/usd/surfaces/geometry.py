@@ -9,7 +9,7 @@ What reads prims of one type alone is imported where there are such.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.gprims.copies import Copies

@@ -8,8 +8,6 @@ from collections.abc import Iterable
 
 from pxr import Ar, Sdf, Usd
 
-from defshade_cli.usd.materials.materialx.document import NotADocument, layer_of, named_files, read_document
-
 log = logging.getLogger("defshade")
 
 INSTALL = "pip install 'defshade[materialx]'"
@@ -40,14 +38,16 @@ def supply_documents(stage: Usd.Stage) -> None:
 
 def files_of(paths: Iterable[str]) -> list[str]:
     """The files that documents name. Nothing is known without the package, or of what is no document."""
-    found: list[str] = []
-    for path in paths:
-        if _suffix(path) == _SUFFIX:
-            try:
-                found += named_files(read_document(path), path)
-            except (ImportError, NotADocument):
-                continue
-    return found
+    return [file for path in paths if _suffix(path) == _SUFFIX for file in _named_by(path)]
+
+
+def _named_by(path: str) -> list[str]:
+    from defshade_cli.usd.materials.materialx.document import NotADocument, named_files, read_document
+
+    try:
+        return [*named_files(read_document(path), path)]
+    except (ImportError, NotADocument):
+        return []
 
 
 def _supply(layer: Sdf.Layer, name: str, supplied: dict[str, Sdf.Layer | None]) -> None:
@@ -63,6 +63,8 @@ def _read(resolved: str, name: str) -> Sdf.Layer | None:
     if not resolved:
         log.warning("no MaterialX document %s", name)
         return None
+    from defshade_cli.usd.materials.materialx.document import NotADocument, layer_of, read_document
+
     try:
         return layer_of(read_document(resolved), resolved)
     except NotADocument as reason:

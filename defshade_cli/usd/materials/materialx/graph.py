@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from pxr import Usd, UsdShade
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.usd.materials.materialx.color_spaces import linearised
 from defshade_cli.usd.materials.materialx.signal import NonLinear, Signal, Values, constant
 from defshade_cli.usd.materials.network import Network, computed, node_of

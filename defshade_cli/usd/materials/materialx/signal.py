@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.texture import IDENTITY, Affine, Texture
 
 Values = NDArray[np.float64]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, cast
 
 import numpy as np
 from pxr import UsdShade
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.material import TEXTURED_FIELDS
 from defshade_cli.scene.texture import Channel, Four, TextureInput
 from defshade_cli.usd.materials.materialx.graph import Graph, Unread
