@@ -147,6 +147,17 @@ def test_foreign_libraries_keep_to_their_rooms() -> None:
     assert not wrong, "\n".join(wrong)
 
 
+def test_dataclasses_are_the_cheap_ones() -> None:
+    wrong = [
+        f"{place}: import dataclass from {PACKAGE.name}.dataclass"
+        for module, path in SOURCES.items()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and node.module == "dataclasses" and module != f"{PACKAGE.name}.dataclass"
+        if (place := f"{path.relative_to(ROOT)}:{node.lineno}") and "dataclass" in [a.name for a in node.names]
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
 def test_no_import_circle() -> None:
     """Among the imports that Python follows when a module loads."""
     graph: dict[str, set[str]] = {module: set() for module in SOURCES}

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import field
+from functools import cache
 from typing import Any
 
 import moderngl
@@ -18,7 +19,7 @@ from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import ShaderError
 from defshade_cli.resources import SHADERS
 
-_INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
+_INCLUDE = re.compile(r'^[ \t]*#include[ \t]+"([^"]+)"[ \t]*\n', re.MULTILINE)
 _LOCATION = re.compile(r"\b\d+(?::(\d+)(?:\(\d+\))?|\((\d+)\))\s*:")  # Mesa "0:12(3):", NVIDIA "0(12) :"
 _STAGES = {"vert": "vertex_shader", "frag": "fragment_shader"}
 
@@ -27,10 +28,10 @@ Generated = Mapping[str, str] | None
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """One shader after its includes: the text, and (file, line) of each of its lines."""
+    """One shader after its includes: the text, and the runs of lines it is made of, as (file, first line, lines)."""
 
     text: str
-    origins: tuple[tuple[str, int], ...]
+    origins: tuple[tuple[str, int, int], ...]
 
     @property
     def name(self) -> str:
@@ -42,7 +43,11 @@ class Source:
 
         def named(match: re.Match[str]) -> str:
             line = int(match[1] or match[2])
-            return "{}:{}:".format(*self.origins[line - 1]) if line <= len(self.origins) else match[0]
+            for file, first, count in self.origins:
+                if line <= count:
+                    return f"{file}:{first + line - 1}:"
+                line -= count
+            return match[0]
 
         return _LOCATION.sub(named, message)
 
@@ -51,39 +56,56 @@ class Source:
 class _Assembly:
     generated: Mapping[str, str]
     included: set[str] = field(default_factory=set)
-    lines: list[str] = field(default_factory=list)
-    origins: list[tuple[str, int]] = field(default_factory=list)
+    runs: list[str] = field(default_factory=list)
+    origins: list[tuple[str, int, int]] = field(default_factory=list)
 
-    def add(self, line: str, file: str, number: int) -> None:
-        self.lines.append(line)
-        self.origins.append((file, number))
+    def add(self, run: str, file: str, first: int) -> None:
+        """Whole lines of a file."""
+        if run:
+            self.runs.append(run)
+            self.origins.append((file, first, run.count("\n")))
 
     def include(self, file: str) -> None:
         if file in self.included:
             return
         self.included.add(file)
-        for number, line in enumerate(self._read(file).splitlines(), 1):
-            if match := _INCLUDE.match(line):
-                self.include(match[1])
-            else:
-                self.add(line, file, number)
+        runs, included = _parts(self._read(file))
+        self.add(runs[0], file, 1)
+        number = 1 + runs[0].count("\n")
+        for name, run in zip(included, runs[1:], strict=True):
+            self.include(name)
+            self.add(run, file, number + 1)
+            number += 1 + run.count("\n")
 
     def _read(self, file: str) -> str:
+        """All of its lines end."""
         if file in self.generated:
-            return self.generated[file]
-        try:
-            return (SHADERS / file).read_text(encoding="utf-8")
-        except OSError as error:
-            raise ShaderError(f"{file}: no such shader in {SHADERS.name}/") from error
+            text = self.generated[file]
+            return text if not text or text.endswith("\n") else f"{text}\n"
+        return _text_of(file)
+
+
+@cache
+def _parts(text: str) -> tuple[list[str], list[str]]:
+    """Runs of lines, and the files included between them."""
+    parts = _INCLUDE.split(text)
+    return parts[::2], parts[1::2]
+
+
+@cache
+def _text_of(file: str) -> str:
+    try:
+        return (SHADERS / file).read_text(encoding="utf-8")
+    except OSError as error:
+        raise ShaderError(f"{file}: no such shader in {SHADERS.name}/") from error
 
 
 def assemble(name: str, defines: Iterable[str] = (), generated: Generated = None) -> Source:
     """The file `name` with its includes and `#define`s; a define is "NAME" or "NAME value". Raises ShaderError."""
     assembly = _Assembly(generated or {})
-    for number, line in enumerate(["#version 450 core", *(f"#define {define}" for define in defines)], 1):
-        assembly.add(line, "<header>", number)
+    assembly.add("".join(["#version 450 core\n", *(f"#define {define}\n" for define in defines)]), "<header>", 1)
     assembly.include(name)
-    return Source("\n".join([*assembly.lines, ""]), tuple(assembly.origins))
+    return Source("".join(assembly.runs), tuple(assembly.origins))
 
 
 class ShaderLibrary:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.passes.filters import filter_offset
 from defshade_cli.settings import Filter
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from defshade_cli import __version__
 from defshade_cli.dataclass import dataclass
@@ -30,6 +29,9 @@ from defshade_cli.rendering.stills import Picture, Stills
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Composition, OutputSettings, RenderJob, RenderSettings
 from defshade_cli.usd.reader import StageReader
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
 
 _FOR_FILES = ("check", "show", "write")
 """Steps that turn a film into files."""
@@ -79,8 +81,9 @@ def run(job: RenderJob, *, command: str = "", renderer: Renderer | None = None) 
     everything = [shot for those in shots.values() for shot in those]
     check_outputs(everything)
     remove_leftovers(everything)
+    written = _written_behind if len(shots) > 1 else _written_at_once
     with nullcontext(renderer) if renderer else Renderer(lone=len(everything) == 1) as lent:
-        yield from _written_behind(_drawn_frames(opened, shots, lent, command, startup))
+        yield from written(_drawn_frames(opened, shots, lent, command, startup))
 
 
 def examine(job: RenderJob) -> tuple[Scene, Plan]:
@@ -145,8 +148,15 @@ def _drawn_frames(
         startup = {}
 
 
+def _written_at_once(frames: Iterator[_DrawnFrame]) -> Generator[FrameResult, None, None]:
+    for frame in frames:
+        yield frame.written()
+
+
 def _written_behind(frames: Iterator[_DrawnFrame]) -> Generator[FrameResult, None, None]:
     """Each frame once it is written, which happens while the next is drawn; also if drawing that one fails."""
+    from concurrent.futures import ThreadPoolExecutor
+
     waiting: Future[FrameResult] | None = None
     failure: DefshadeError | None = None
     try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from math import ceil, isfinite
 
 from defshade_cli.dataclass import dataclass
@@ -66,6 +65,10 @@ def from_ndc(ndc: tuple[float, float, float, float], display: tuple[int, int]) -
     """
     if not all(isfinite(border) for border in ndc):
         raise UsageError(f"a data window of {ndc} has no pixels")
+    if ndc == WHOLE_IMAGE:
+        return DataWindow(0, 0, *display)
+    from fractions import Fraction
+
     xmin, ymin, xmax, ymax = (Fraction(value) for value in ndc)
     columns = [ceil(x * display[0] - Fraction(1, 2)) for x in (xmin, xmax)]
     rows = [ceil((1 - y) * display[1] - Fraction(1, 2)) for y in (ymax, ymin)]
