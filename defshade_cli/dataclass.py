@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import MISSING, FrozenInstanceError, fields
 from operator import attrgetter
 from reprlib import recursive_repr
+from types import MemberDescriptorType
 from typing import TYPE_CHECKING, Any, NoReturn
 
 
@@ -39,9 +40,9 @@ def _dataclass(*, frozen: bool = False, eq: bool = True, **layout: bool) -> Call
 
 def _init(cls: type, frozen: bool) -> Callable[..., None]:
     """The one method that is written out, for it is called most."""
-    known: dict[str, Any] = {"__name__": cls.__module__, "_set": object.__setattr__, "_absent": MISSING}
+    known: dict[str, Any] = {"__name__": cls.__module__, "_absent": MISSING}
     heads: dict[bool, list[str]] = {False: ["self"], True: []}
-    body = []
+    body = ["_held = self.__dict__"] if frozen and cls.__dictoffset__ else []
     for field in fields(cls):
         head = value = name = field.name
         if field.default_factory is not MISSING:
@@ -51,11 +52,20 @@ def _init(cls: type, frozen: bool) -> Callable[..., None]:
             known[f"_default_{name}"] = field.default
             head = f"{name}=_default_{name}"
         heads[field.kw_only is True].append(head)
-        body.append(f"_set(self, {name!r}, {value})" if frozen else f"self.{name} = {value}")
+        body.append(_setting(cls, name, value, known) if frozen else f"self.{name} = {value}")
     body += ["self.__post_init__()"] if hasattr(cls, "__post_init__") else []
     named = ["*", *heads[True]] if heads[True] else []
     exec(f"def __init__({', '.join(heads[False] + named)}):\n " + "\n ".join(body or ["pass"]), known)
     return known["__init__"]
+
+
+def _setting(cls: type, name: str, value: str, known: dict[str, Any]) -> str:
+    """How a field of a frozen class is set, past its own refusal, in a third of the time of `object.__setattr__`."""
+    slot = getattr(cls, name, None)
+    if isinstance(slot, MemberDescriptorType):
+        known[f"_set_{name}"] = slot.__set__
+        return f"_set_{name}(self, {value})"
+    return f"_held[{name!r}] = {value}"
 
 
 def _values(names: Iterable[str]) -> Callable[[Any], tuple[Any, ...]]:

@@ -48,7 +48,7 @@ class Mesh:
         freeze = object.__setattr__
         freeze(self, "points", frozen(self.points, np.float32, count, 3))
         freeze(self, "normals", frozen(self.normals, np.float32, count, 3))
-        freeze(self, "triangles", frozen(self.triangles, np.uint32, -1, 3))
+        freeze(self, "triangles", frozen(self.triangles, np.uint32, len(self.triangles), 3))
         freeze(self, "faces", frozen(self.faces, np.int32, len(self.triangles)))
         if self.display_color is not None:
             freeze(self, "display_color", frozen(self.display_color, np.float32, count, 3))

@@ -41,9 +41,10 @@ class Palette:
 
     def material(self, bindings: Bindings) -> Material:
         """The one that is drawn."""
-        if bindings not in self._chosen:
-            self._chosen[bindings] = self._choose(bindings)
-        return self._chosen[bindings]
+        chosen = self._chosen.get(bindings)
+        if chosen is None:
+            chosen = self._chosen[bindings] = self._choose(bindings)
+        return chosen
 
     def _choose(self, bindings: Bindings) -> Material:
         candidates = [self._memory.material(path, self._time) for path in bindings.candidates_for(self._purposes)]

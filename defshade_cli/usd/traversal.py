@@ -75,6 +75,7 @@ class Traversal:
         self.portals: list[str] = []
         self._stage, self._memory, self._purposes = stage, memory, purposes
         self._time, self._base, self._rules = time, base, rules
+        self._is_at_frame = time == base
         self._prototypes: dict[tuple[Sdf.Path, Sdf.Path | None], tuple[Piece, ...] | None] = {}
         memory.xforms.SetTime(time)
 
@@ -205,7 +206,7 @@ class Traversal:
         return None if light is None else self._piece(prim, here, light)
 
     def _gprim(self, prim: Usd.Prim, here: Standing, said: Said) -> Piece | _Awaited | None:
-        asked = self._memory.ask(prim, self._time, said) if self._time == self._base else None
+        asked = self._memory.ask(prim, self._time, said) if self._is_at_frame else None
         if asked:
             return _Awaited(asked, here, len(self.issues))
         surface = self._memory.surface_around(prim, self._time, self._base, said)

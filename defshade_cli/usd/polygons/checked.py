@@ -49,9 +49,8 @@ def _fits(mesh: Told) -> bool:
     if not lying:
         return True
     due = count_elements(len(mesh.counts), len(mesh.points), len(mesh.indices))
-    return all(
-        len(each.values if each.indices is None else each.indices) == due.get(each.interpolation, 0) for each in lying
-    )
+    sizes = [(len(each.values if each.indices is None else each.indices), each.interpolation) for each in lying]
+    return all(size == due.get(interpolation, 0) for size, interpolation in sizes)
 
 
 def _are_sound(lying: Sequence[Lying]) -> list[bool]:
