@@ -16,14 +16,21 @@ from defshade_cli.errors import UsageError
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.snapshot import write_snapshot
 from defshade_cli.measure.conformance import batch
-from defshade_cli.measure.conformance.arnold import read_as_arnold
+from defshade_cli.measure.conformance.arnold import read_as_arnold, samples_of
 from defshade_cli.measure.conformance.catalogue import assets_folder, read_item
 from defshade_cli.measure.conformance.conditions import under, with_bare
 from defshade_cli.measure.conformance.drawing import draw
 from defshade_cli.measure.conformance.page import page_of
+from defshade_cli.measure.conformance.remarks import remark_on
 from defshade_cli.measure.conformance.report import report_of, summary_of, tables_of
 from defshade_cli.measure.conformance.results import LEAST_IOU, Result
-from defshade_cli.measure.conformance.silhouette import even_background, intersection_over_union, mask_of_color
+from defshade_cli.measure.conformance.silhouette import (
+    Noise,
+    even_background,
+    intersection_over_union,
+    mask_of_color,
+    noise_of,
+)
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.usd.reader import StageReader
 from stages import stage_of
@@ -126,6 +133,26 @@ def test_a_mask_is_what_differs_from_an_even_background() -> None:
     assert background is not None and mask_of_color(picture, background).sum() == 3
     picture[0, 0] = 0.0
     assert even_background(picture) is None
+
+
+def test_what_chance_costs_a_silhouette_is_that_of_its_border() -> None:
+    """A pixel of which 3/4 are covered is seen by one sample three times in four: of four pixels, it is missed then."""
+    whole = np.array([[1.0, 0.0], [1.0, 1.0]])
+    assert noise_of(whole, 4, 0.5) == Noise(4, 1.0, 1.0)
+    noise = noise_of(np.append(whole, [[0.75, 0.0]], axis=0), 1, 0.5)
+    assert noise.low == 0.75 and noise.mean == pytest.approx(0.75 * 1.0 + 0.25 * 0.75, abs=0.02)
+
+
+def test_only_what_chance_explains_has_a_remark(tmp_path: Path) -> None:
+    (case,) = read_item(item(tmp_path, {"image": "a.tif", "command": "kick cube.usda -r 16 9"}))
+    noise = Noise(16, 0.95, 0.97)
+    assert remark_on(case, 0.96, noise) == "16 random samples a pixel of ours agree with it to 0.9700"
+    assert remark_on(case, 0.94, noise) == remark_on(case, 0.96) == remark_on(case, 0.995, noise) == ""
+
+
+def test_arnold_takes_the_samples_that_its_settings_ask_for() -> None:
+    assert samples_of(stage_of('def Cube "c" {}')) == 9
+    assert samples_of(stage_of('def RenderSettings "r" {\n custom int arnold:global:AA_samples = 4\n}')) == 16
 
 
 # Workers

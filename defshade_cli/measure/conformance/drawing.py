@@ -13,17 +13,19 @@ from numpy.typing import NDArray
 from defshade_cli.dataclass import dataclass
 from defshade_cli.image.film import Film
 from defshade_cli.image.reading import read
-from defshade_cli.measure.conformance.arnold import read_as_arnold
+from defshade_cli.measure.conformance.arnold import read_as_arnold, samples_of
 from defshade_cli.measure.conformance.catalogue import Case
 from defshade_cli.measure.conformance.conditions import under, with_bare
 from defshade_cli.measure.conformance.silhouette import (
     ANY_SAMPLE,
     HALF,
     Mask,
+    Noise,
     even_background,
     intersection_over_union,
     mask_of_alpha,
     mask_of_color,
+    noise_of,
 )
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan, plan_moments
@@ -56,7 +58,7 @@ _OURS_ALONE, _THEIRS_ALONE = (1.0, 0.45, 0.0), (0.0, 0.7, 1.0)
 class Drawn:
     """pictures: "ours", and where there are any "reference" and "difference" → (H, W, 3) in [0, 1], display-ready.
 
-    iou, rmse, unsupported, seconds: as in Result.
+    iou, rmse, unsupported, seconds: as in Result.  noise: of the reference, where it is one of random samples.
     """
 
     pictures: dict[str, Picture]
@@ -64,6 +66,7 @@ class Drawn:
     seconds: dict[str, float]
     iou: float | None = None
     rmse: float | None = None
+    noise: Noise | None = None
 
 
 def draw(case: Case, pipeline: Pipeline) -> Drawn:
@@ -80,7 +83,10 @@ def draw(case: Case, pipeline: Pipeline) -> Drawn:
     seconds = {"read": read_at - start, "draw": time.perf_counter() - read_at}
     unsupported = tuple(f"{issue.path}: {issue.reason}" for issue in scene.unsupported)
     drawn = Drawn({"ours": _shown(case, pixels)}, unsupported, seconds)
-    return drawn if reference is None else _compared(case, drawn, alpha, reference)
+    if reference is None:
+        return drawn
+    noise = noise_of(alpha, samples_of(stage), HALF) if case.maker == "arnold" else None
+    return replace(_compared(case, drawn, alpha, reference), noise=noise)
 
 
 def _compared(case: Case, drawn: Drawn, alpha: Picture, reference: Picture) -> Drawn:

@@ -10,10 +10,12 @@ neighbouring pixels: there a pixel counts where half of it is covered.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+_DRAWS = 1000
 
 Mask = NDArray[np.bool_]
 Color = tuple[float, float, float]
@@ -47,3 +49,23 @@ def intersection_over_union(a: Mask, b: Mask) -> float:
     """|a ∩ b| / |a ∪ b|; 1 for two that are empty."""
     union = np.count_nonzero(a | b)
     return np.count_nonzero(a & b) / union if union else 1.0
+
+
+class Noise(NamedTuple):
+    """IoU of a silhouette with itself as `samples` random samples a pixel have it: 1 % are less than `low`."""
+
+    samples: int
+    low: float
+    mean: float
+
+
+def noise_of(alpha: NDArray[Any], samples: int, threshold: float) -> Noise:
+    """What chance alone costs a picture that covers pixels by so much (H, W)."""
+    silhouette = mask_of_alpha(alpha, threshold)
+    at_border = (alpha > 0.0) & (alpha < 1.0)
+    draws = np.random.default_rng(0).binomial(samples, alpha[at_border], (_DRAWS, np.count_nonzero(at_border)))
+    drawn, exact = mask_of_alpha(draws / samples, threshold), silhouette[at_border]
+    inside = np.count_nonzero(silhouette & ~at_border)
+    common, either = ((inside + np.count_nonzero(each, axis=1)) for each in (drawn & exact, drawn | exact))
+    agreeing = np.divide(common, either, out=np.ones(_DRAWS), where=either > 0)
+    return Noise(samples, float(np.quantile(agreeing, 0.01)), float(agreeing.mean()))

@@ -41,7 +41,7 @@ def examine(case: Case, pipeline: Pipeline, out: Path) -> Result:
         case,
         iou=drawn.iou,
         rmse=drawn.rmse,
-        remark=remark_on(case, drawn.iou),
+        remark=remark_on(case, drawn.iou, drawn.noise),
         unsupported=drawn.unsupported,
         warnings=tuple(dict.fromkeys(warnings)),
         pictures=pictures,
