@@ -148,6 +148,19 @@ def test_normals_that_oppose_the_winding_turn_it() -> None:
     assert reasons(gprim) == ["the normals oppose the winding, which is reversed"]
 
 
+@pytest.mark.parametrize("share", [0.0, 0.4, 0.6, 1.0])
+def test_the_most_of_a_large_mesh_decide_which_way_it_is_wound(share: float) -> None:
+    """Some of its faces are asked first; where they are of two minds, all are."""
+    side = 40
+    points = np.array([(x, y, 0) for y in range(side + 1) for x in range(side + 1)], np.float32)
+    corners = [y * (side + 1) + x for y in range(side) for x in range(side)]
+    mesh = define_mesh(points, [[c, c + 1, c + side + 2, c + side + 1] for c in corners])
+    author(mesh, [[0, 0, -1 if number < share * side**2 else 1] for number in range(side**2)], "uniform")
+    gprim = read(mesh)
+    assert (vector_areas(gprim.mesh)[:, 2] < 0.0).all() == (share > 0.5)
+    assert bool(gprim.issues) == (share > 0.5)
+
+
 def test_normals_that_only_slant_leave_the_winding() -> None:
     """A constant normal on a cube agrees with as many faces as it opposes."""
     mesh = define_cube()

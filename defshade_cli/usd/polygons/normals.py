@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.spaces import cross
-from defshade_cli.usd.polygons.end_to_end import Row
+from defshade_cli.usd.polygons.end_to_end import LARGEST, Row
 from defshade_cli.usd.polygons.polygons import Polygons, Primvar
 
 _NO_SHAPE = (0.0, 0.0, 1.0)
@@ -17,6 +17,12 @@ _NO_SHAPE = (0.0, 0.0, 1.0)
 
 _OPPOSED = -1e-3
 """Mean cosine between normals and faces below which the two are taken to disagree."""
+
+_CLEAR = 0.5
+"""Mean cosine in a face of which there is no doubt."""
+
+_ASKED_FIRST = 256
+"""Faces of a large mesh."""
 
 _UNCLEAR = 1e-6
 """Of that cosine: sums may differ by so much with the order in which they are taken."""
@@ -135,9 +141,26 @@ def _from_shape(polygons: Polygons, like: Primvar) -> NDArray[np.float32]:
 
 
 def _opposed(polygons: Polygons, normals: Primvar) -> bool:
-    """Do the normals, on the whole, point away from the outside that the winding gives?"""
+    """Do the normals, on the whole, point away from the outside that the winding gives?
+
+    Of a large mesh some faces are asked first: where none is in doubt, none of the others is asked.
+    """
+    if len(polygons.indices) > LARGEST:
+        some = _some_faces(polygons, normals)
+        assert some.normals is not None
+        along, most = _agreement(some, some.normals)
+        if (along >= _CLEAR * most).all():
+            return False
     along, most = _agreement(polygons, normals)
     return bool(along.sum() < _OPPOSED * most.sum())
+
+
+def _some_faces(polygons: Polygons, normals: Primvar) -> Polygons:
+    """Every so many of the faces, with their normals."""
+    count = len(polygons.counts)
+    kept = np.arange(count) % max(count // _ASKED_FIRST, 1) == 0
+    bare = Polygons(polygons.points, polygons.counts, polygons.indices, polygons.faces, normals=normals)
+    return replace(bare, left_handed=polygons.left_handed).select(kept)
 
 
 def _agreement(polygons: Polygons, normals: Primvar) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
