@@ -79,6 +79,24 @@ def test_curves_that_end_where_they_begin_are_closed() -> None:
     assert np.linalg.norm(np.diff(found.points, axis=0), axis=1).min() > 0.1
 
 
+def test_a_closed_curve_beside_an_open_one_has_no_notch() -> None:
+    """The tube around it ends where it begins, with the normals that it begins with."""
+    alone, line = ring(), [(0, 0, 0), (0, 0, 1)]
+    both = curves(
+        np.append(np.array(alone.GetPointsAttr().Get()), line, axis=0),
+        [9, 2],
+        [3, 2],
+        [*alone.GetKnotsAttr().Get(), 0, 0, 1, 1],
+    )
+    both.CreatePointWeightsAttr([*alone.GetPointWeightsAttr().Get(), 1, 1])
+    polygons, found = read(both).surface.polygons, strands(both)
+    around = len(polygons.points) // len(found.points)
+    ends = np.array([0, found.counts[0] - 1])
+    for values in (polygons.points, polygons.normals.values):
+        first, last = values.reshape(-1, around, 3)[ends]
+        np.testing.assert_allclose(last, first, atol=1e-6)
+
+
 def test_a_range_cuts_the_curve() -> None:
     schema = ring()
     schema.CreateRangesAttr([(0.0, 1.0)])

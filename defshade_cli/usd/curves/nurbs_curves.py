@@ -15,6 +15,7 @@ from pxr import Usd, UsdGeom
 from defshade_cli.usd.curves.basis import Kind, Weights, sparse_weights
 from defshade_cli.usd.curves.curves import CURVES_ATTRIBUTES, read_normals, read_widths
 from defshade_cli.usd.curves.strands import Strands
+from defshade_cli.usd.curves.tubes import TOUCHING
 from defshade_cli.usd.nurbs.nurbs import homogeneous_points
 from defshade_cli.usd.polygons.polygons import Primvar
 from defshade_cli.usd.polygons.primvars import DISPLAY_COLOR, NOTHING_CARRIED, fit, read_carried
@@ -25,8 +26,6 @@ NURBS_CURVES_ATTRIBUTES = (*CURVES_ATTRIBUTES, "order", "knots", "ranges", "poin
 
 _STEPS_A_DEGREE = 6
 """Lines along a span between two knots, for each degree; one where the curve is linear."""
-_TOUCHING = 1e-6
-"""Of the size of all curves: ends that are no farther apart are one."""
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -119,7 +118,7 @@ def _lines(splines: _Splines) -> _Lines:
     points = _projected(weights @ splines.control)
     turns = np.diff(samples.curve) != 0
     first, last = np.append(True, turns), np.append(turns, True)
-    if (np.abs(points[first] - points[last]) > _TOUCHING * np.ptp(points)).any():
+    if (np.abs(points[first] - points[last]) > TOUCHING * np.ptp(points)).any():
         return _Lines("nonperiodic", samples.curve, weights)
     return _Lines("periodic", samples.curve[~last], weights[~last])
 

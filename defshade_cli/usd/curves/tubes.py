@@ -19,6 +19,9 @@ from defshade_cli.usd.polygons.polygons import Polygons, Primvar
 
 Vectors = NDArray[np.float64]
 
+TOUCHING = 1e-6
+"""Of the size of all curves of a prim: ends that are no farther apart are one."""
+
 _LONGEST_MITRE = 4.0
 """In radii: the tip of a sharp bend, as in PostScript's mitre limit."""
 
@@ -26,7 +29,7 @@ _LONGEST_MITRE = 4.0
 def tubes(samples: CurveSamples, centres: Vectors, radii: NDArray[np.float64], sides: int) -> Polygons:
     """Round, `sides` points a sample, open at their ends. centres (N, 3), radii (N,): in scene units."""
     course = _course(samples, centres)
-    across = _frames(samples, course.tangent)
+    across = _frames(samples, course)
     angle = np.arange(sides) * (2.0 * math.pi / sides)
     beside = np.cross(course.tangent, across)
     normals = across[:, None] * np.cos(angle)[:, None] + beside[:, None] * np.sin(angle)[:, None]
@@ -52,11 +55,13 @@ class _Course:
 
     tangent: (S, 3) unit, halfway between the ways in and out.  bend: (S, 3) unit, across it, towards the outside of
     the turn; zero where there is none.  stretch: (S,) how much longer a cut through the tube is there.
+    meeting: (K,) whether a curve with samples ends where it begins, and its last sample stands for its first.
     """
 
     tangent: Vectors
     bend: Vectors
     stretch: NDArray[np.float64]
+    meeting: NDArray[np.bool_]
 
     def mitred(self, offsets: Vectors) -> Vectors:
         """Offsets (S, K, 3) across the curve, so that the straight parts before and after keep their width."""
@@ -111,6 +116,8 @@ def _course(samples: CurveSamples, centres: Vectors) -> _Course:
     before = np.arange(-1, samples.count - 1)
     first, last = _ends(samples)
     before[first] = last if samples.closed else first
+    meeting = _meeting(samples, centres)
+    before[first[meeting]], after[last[meeting]] = last[meeting] - 1, first[meeting] + 1
     inward, outward = normalize(centres - centres[before]), normalize(centres[after] - centres)
     inward = np.where(inward.any(axis=1, keepdims=True), inward, outward)
     outward = np.where(outward.any(axis=1, keepdims=True), outward, inward)
@@ -119,11 +126,22 @@ def _course(samples: CurveSamples, centres: Vectors) -> _Course:
     tangent[reversed_] = inward[reversed_]
     tangent[~tangent.any(axis=1)] = (0.0, 0.0, 1.0)
     cosine = np.einsum("si,si->s", inward, tangent)
-    return _Course(tangent, normalize(inward - outward), 1.0 / np.maximum(cosine, 1.0 / _LONGEST_MITRE))
+    stretch = 1.0 / np.maximum(cosine, 1.0 / _LONGEST_MITRE)
+    return _Course(tangent, normalize(inward - outward), stretch, meeting)
 
 
-def _frames(samples: CurveSamples, tangents: Vectors) -> Vectors:
+def _meeting(samples: CurveSamples, centres: Vectors) -> NDArray[np.bool_]:
+    """(K,) of curves that are sampled as open ones, those whose ends are one; a way there and back is none."""
+    first, last = _ends(samples)
+    if samples.closed or not len(first):
+        return np.zeros(len(first), bool)
+    apart = np.abs(centres[first] - centres[last]).max(axis=1)
+    return (last - first > 2) & (apart <= TOUCHING * np.ptp(centres))
+
+
+def _frames(samples: CurveSamples, course: _Course) -> Vectors:
     """(S, 3) unit vectors across the tangents, which turn no more than these do; a closed curve's twist is spread."""
+    tangents, meeting = course.tangent, course.meeting
     first, last = _ends(samples)
     lengths = last - first + 1
     start, place = np.repeat(first, lengths), np.arange(samples.count) - np.repeat(first, lengths)
@@ -131,10 +149,11 @@ def _frames(samples: CurveSamples, tangents: Vectors) -> Vectors:
     carried = _running_products(turns, place)
     origin = _across(tangents[first])
     across = _rotated(carried, np.repeat(origin, lengths, axis=0))
-    if samples.closed:
+    if samples.closed or meeting.any():
         home = _rotated(_least_rotations(tangents[last], tangents[first]), across[last])
         twist = np.arctan2(np.einsum("ki,ki->k", np.cross(home, origin), tangents[first]), (home * origin).sum(axis=1))
-        angle = np.repeat(twist / lengths, lengths) * place
+        steps = np.where(meeting, lengths - 1, lengths)
+        angle = np.repeat(np.where(meeting | samples.closed, twist / steps, 0.0), lengths) * place
         across = across * np.cos(angle)[:, None] + np.cross(tangents, across) * np.sin(angle)[:, None]
     return across
 
