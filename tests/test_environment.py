@@ -86,6 +86,15 @@ def test_harmonics_are_orthonormal() -> None:
     assert_allclose(4 * math.pi * (y.T @ y) / len(d), np.eye(9), atol=0.02)  # 1/√200000 of noise, times 4π
 
 
+@pytest.mark.parametrize("shape", [(1, 1), (1, 4), (3, 2), (64, 128)])
+def test_a_coarse_even_sky_lights_alike_from_all_sides(shape: tuple[int, int]) -> None:
+    """Irradiance π on every surface, of which only the first harmonic is not zero."""
+    sky = Environment(np.ones((*shape, 3), np.float32))
+    even = np.zeros((9, 3))
+    even[0] = 2.0 * math.pi**1.5
+    assert_allclose(sky.irradiance_sh, even, atol=2e-3)
+
+
 def test_balanced_directions_have_the_harmonics_of_their_sky() -> None:
     """However few; a diffuse surface sees little else of the sky."""
     rng = np.random.default_rng(3)
