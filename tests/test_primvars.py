@@ -7,6 +7,7 @@ import pytest
 from pxr import Sdf, UsdGeom, Vt
 
 from prims import DEFAULT, define_cube, define_mesh, read, reasons, set_primvar
+from test_material import READER, issues, of_cube, surface
 
 POINTS = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [0, 1, 0]]
 FACES = [[0, 1, 4, 5], [1, 2, 3, 4]]
@@ -179,3 +180,12 @@ def test_values_of_dropped_faces_go_with_them() -> None:
     drawn = gprim.mesh.triangles
     np.testing.assert_array_equal(gprim.mesh.display_color[drawn, 0], np.repeat(gprim.mesh.faces[:, None], 3, axis=1))
     np.testing.assert_array_equal(gprim.mesh.display_opacity[drawn] // 4, gprim.mesh.display_color[drawn, 0])
+
+
+@pytest.mark.parametrize("name", ["emissiveColor", "metallic", "roughness", "ior", "opacity", "normal", "displacement"])
+def test_a_reader_that_feeds_another_input_is_said_and_its_fallback_taken(name: str) -> None:
+    reader = READER.format(type="float", name="worn", fallback="float inputs:fallback = 0.25")
+    text = surface("m", f"float inputs:{name}.connect = </m/reader.outputs:result>", reader)
+    assert issues(text) == [f"without {name} (primvar worn)"]
+    if name not in ("normal", "displacement"):
+        assert of_cube(text) == of_cube(surface("m", f"float inputs:{name} = 0.25"))
