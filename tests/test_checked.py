@@ -16,6 +16,11 @@ from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.surfaces import tessellation
 
 INTERPOLATIONS = ("constant", "uniform", "varying", "vertex", "faceVarying")
+INHERITED = (
+    ("displayColor", "color3f[]", Gf.Vec3f(1, 0, 0)),
+    ("st", "texCoord2f[]", Gf.Vec2f(0.5, 0.25)),
+    ("displayColor", "texCoord2f[]", Gf.Vec2f(0, 1)),
+)
 QUADS = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]])
 POINTS = np.array([[x, y, 0] for y in range(3) for x in range(3)], np.float32)
 
@@ -28,8 +33,8 @@ def random_stage(seed: int, count: int = 40) -> Usd.Stage:
     for group in range(3):
         above = UsdGeom.Xform.Define(stage, f"/World/g{group}").GetPrim()
         if rng.random() < 0.3:
-            primvar = UsdGeom.PrimvarsAPI(above).CreatePrimvar("displayColor", Sdf.ValueTypeNames.Color3fArray)
-            primvar.Set([Gf.Vec3f(1, 0, 0)])
+            name, kind, value = INHERITED[rng.integers(len(INHERITED))]
+            UsdGeom.PrimvarsAPI(above).CreatePrimvar(name, Sdf.ValueTypeNames.Find(kind)).Set([value])
         if rng.random() < 0.5:
             _bind(rng, above, looks)
     for number in range(count):

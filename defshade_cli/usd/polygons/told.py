@@ -6,6 +6,7 @@ them but what is so common that it pays. All others are for usd/polygons/mesh.py
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from defshade_cli.usd.color_space import in_rec709
 from defshade_cli.usd.polygons.end_to_end import LARGEST
 from defshade_cli.usd.polygons.mesh import sizes_of
 from defshade_cli.usd.polygons.polygons import SCHEMES, Interpolation, Primvar, Scheme
+from defshade_cli.usd.polygons.primvars import find_primvars
 from defshade_cli.usd.said import Said
 
 _PRIMVARS, _INDICES = "primvars:", ":indices"
@@ -36,6 +38,7 @@ _COMMON = (
 """Of primvars; all but the first two are no texture coordinates."""
 
 
+_DISPLAY_OPACITY = "primvars:displayOpacity"
 _NO_INDICES = Vt.IntArray()
 
 
@@ -77,7 +80,7 @@ _MORE = Lying("normals", "", np.empty((0, 3), np.float32), "constant")
 def told_of(prim: Usd.Prim, said: Said, time: Usd.TimeCode, color: str) -> Told | None:
     """None where there is more to it. color: as read_surface has it."""
     names = said.names
-    if said.inherits or not _RARE.isdisjoint(names):
+    if not _RARE.isdisjoint(names):
         return None
     indices = prim.GetAttribute("faceVertexIndices").Get(time)
     if not isinstance(indices, Vt.IntArray) or not 0 < len(indices) <= LARGEST:
@@ -116,18 +119,20 @@ def _normals(prim: Usd.Prim, said: Said, time: Usd.TimeCode) -> Lying | None:
 
 
 def _carried(prim: Usd.Prim, said: Said, time: Usd.TimeCode, color: str) -> tuple[Lying, ...] | None:
-    """Colour, opacity and texture coordinates of the prim's own; None where there is more to them."""
+    """Colour, opacity and texture coordinates, its own or inherited; None where there is more to them."""
     found = []
-    for name in said.lying:
-        attribute = prim.GetAttribute(name)
+    for name, attribute in _lying(prim, said):
         value = attribute.Get(time) if attribute else None
+        is_display = name in (_PRIMVARS + color, _DISPLAY_OPACITY)
         type_name = None if isinstance(value, Vt.Vec2fArray) else attribute and attribute.GetTypeName()
+        if type_name is None and is_display:
+            return None
         if type_name is not None and type_name not in _COMMON:
             return None
         field, expected = _read_as(name[len(_PRIMVARS) :], type_name, color)
         if not expected:
             continue
-        indices = prim.GetAttribute(name + _INDICES).Get(time) if name + _INDICES in said.names else _NO_INDICES
+        indices = _indices(attribute, name, prim, said, time)
         if not isinstance(value, expected) or not value or not isinstance(indices, Vt.IntArray):
             return None
         colors = in_rec709(attribute, value) if type_name in _COLORS else value
@@ -135,6 +140,21 @@ def _carried(prim: Usd.Prim, said: Said, time: Usd.TimeCode, color: str) -> tupl
         chosen = None if indices is _NO_INDICES else np.asarray(indices)
         found.append(Lying(field, name[len(_PRIMVARS) :], np.asarray(colors), interpolation, chosen))
     return tuple(found)
+
+
+def _lying(prim: Usd.Prim, said: Said) -> Iterable[tuple[str, Usd.Attribute]]:
+    """Primvars by the names of their attributes, in the order of read_carried."""
+    if not said.inherits:
+        return [(name, prim.GetAttribute(name)) for name in said.lying]
+    found = ((str(primvar.GetName()), primvar.GetAttr()) for primvar in find_primvars(prim).values())
+    return [(name, attribute) for name, attribute in found if name != "primvars:normals"]
+
+
+def _indices(attribute: Usd.Attribute, name: str, prim: Usd.Prim, said: Said, time: Usd.TimeCode) -> Any:
+    if not said.inherits:
+        return prim.GetAttribute(name + _INDICES).Get(time) if name + _INDICES in said.names else _NO_INDICES
+    primvar = UsdGeom.Primvar(attribute)
+    return primvar.GetIndices(time) if primvar.IsIndexed() else _NO_INDICES
 
 
 def _read_as(name: str, type_name: Sdf.ValueTypeName | None, color: str) -> tuple[Any, type | None]:
