@@ -17,7 +17,7 @@ from defshade_cli.measure.reference import surface_from_planes
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.passes.sampling import owen_sobol_3d
 from defshade_cli.plan import make_plan
-from defshade_cli.plan.points import share_points, share_shown
+from defshade_cli.plan.points import samples_whole, share_points, share_shown
 from defshade_cli.scene.emission import Emitter, emitter_at
 from defshade_cli.scene.light import CylinderLight, DiskLight, DomeLight, Light, RectLight, SphereLight
 from defshade_cli.scene.mesh_light import MeshLight
@@ -97,12 +97,26 @@ def test_discs_that_small_lights_show_as_vary_as_the_light_does() -> None:
 
     def shown(index: int) -> Emitter:
         point = emitter_at(ball, owen_sobol_3d(index % 256, 0), np.zeros(3))
-        disc = point.shown_as(ball, share_shown(index)).shown
+        disc = point.shown_as(ball, share_shown(index, 128)).shown
         assert disc is not None
         return disc
 
     assert shown(0).position.tolist() == [1, 2, 3] and shown(127).extent == pytest.approx(math.pi * 0.25)
-    assert shown(255).extent == pytest.approx(0.5 * math.pi * 0.25) and share_shown(2**20) < 1e-3
+    assert shown(255).extent == pytest.approx(0.5 * math.pi * 0.25) and share_shown(2**20, 128) < 1e-3
     aside = np.array([emitter_at(ball, owen_sobol_3d(i, 0), np.zeros(3)).shown_as(ball, 0.5) for i in range(256)])
     places = np.array([emitter.shown.position - ball.position for emitter in aside])[:, :2]
     assert np.sum(places**2) / 256 == pytest.approx(0.5 * (0.5 * 0.25), rel=0.02)
+
+
+def test_small_lights_show_as_a_whole_while_points_would_err_more() -> None:
+    """Those that look smaller than any lobe always; others in 20 samples for each lobe they hold."""
+    ball = SphereLight(path="/l", world_from_light=at(0, 0, 0), color=(1, 1, 1), radius=0.5)
+
+    def whole(narrowest: float, samples: int, light: Light = ball, size: float = 0.05) -> int:
+        return samples_whole(light, 1, size, narrowest, RenderSettings(samples=samples))
+
+    assert whole(0.04, 16) == whole(0.04, 4096) == 128
+    assert (whole(0.0025, 1024), whole(0.0025, 4096), whole(0.01, 64), whole(0.01, 256)) == (1024, 0, 64, 0)
+    assert not whole(0.04, 16, size=0.5) and not whole(
+        0.04, 16, RectLight(path="/l", world_from_light=at(0, 0, 0), color=(1, 1, 1))
+    )

@@ -77,9 +77,9 @@ def _emitters(
         places = [sample.on_light(number, k, count) for k in range(count)]
         directions = [sky_emitter(light, sky, u[:2], 1.0 / count, guide, balance) for u in places]
         return [direction.shared_by(plan.samples) for direction in directions]
-    if planned.is_whole:
+    if planned.samples_whole:
         point = emitter_at(light, _MIDDLE if plan.samples == 1 else sample.on_shape(number), light.position)
-        return [point.shown_as(light, share_shown(sample.index))]
+        return [point.shown_as(light, share_shown(sample.index, planned.samples_whole))]
     if plan.samples * planned.points == 1:
         return [far_field(light)]
     towards = middle_of(extent, plan)

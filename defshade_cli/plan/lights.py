@@ -22,7 +22,15 @@ from defshade_cli.dataclass import dataclass
 from defshade_cli.image.light_texture import with_texture
 from defshade_cli.plan.groups import group_lights, light_groups, light_outputs
 from defshade_cli.plan.overlap import reaches_into_ball
-from defshade_cli.plan.points import NEAREST_WHOLE, apparent_size, is_whole, points_of, share_points
+from defshade_cli.plan.points import (
+    MIN_ALPHA,
+    NEAREST_WHOLE,
+    apparent_size,
+    narrowest_lobe,
+    points_of,
+    samples_whole,
+    share_points,
+)
 from defshade_cli.scene.light import DistantLight, Light, SphereLight
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
@@ -31,7 +39,6 @@ from defshade_cli.settings import RenderSettings, Shading
 Volume = Literal["quad", "sphere", "cone"]
 
 _MARGIN = 1e-3  # relative slack around bounds that float32 may round outwards
-_MIN_ALPHA = 1e-4  # shaders/lib/constants.glsl
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +48,7 @@ class PlannedLight:
     reach: radius of the volume in scene units, infinite for a quad.
     is_empty: no geometry lies within a sphere light.
     groups: the layers that sum it.
-    is_whole: it shows as a whole, see plan/points.py.
+    samples_whole: the first samples, in which it shows as a whole, see plan/points.py; 0 for a light that never does.
     points: that stand for the light in each sample; 1 is its far field where there is a single sample.
     by_rays: lobes see it by rays of each pixel's own as well, see plan/lobe_rays.py.
     """
@@ -54,7 +61,7 @@ class PlannedLight:
     groups: tuple[str, ...] = ()
     points: int = 1
     by_rays: bool = False
-    is_whole: bool = False
+    samples_whole: int = 0
 
 
 def volume_of(light: Light) -> Volume:
@@ -79,6 +86,7 @@ def plan_lights(
     groups = group_lights([light for _, light in lit], light_groups(layers), light_outputs(layers))
     sizes = [apparent_size(light, scene.roomy_bounds) for _, light in lit]
     points = share_points(sizes, settings)
+    narrowest = narrowest_lobe(scene.materials)
     planned = [
         PlannedLight(
             light=light,
@@ -88,7 +96,9 @@ def plan_lights(
             is_empty=_is_empty(light, scene),
             groups=of_light,
             points=points_of(light, count, settings),
-            is_whole=is_whole(light, count, size, settings) and _is_empty(light, scene, NEAREST_WHOLE),
+            samples_whole=samples_whole(light, count, size, narrowest, settings)
+            if _is_empty(light, scene, NEAREST_WHOLE)
+            else 0,
         )
         for (number, light), of_light, count, size in zip(lit, groups, points, sizes, strict=True)
     ]
@@ -104,7 +114,7 @@ def _greatest_response(material: Material, shading: Shading) -> float:
     if shading == "preview-surface":
         amount = 1.0 if "clearcoat" in material.inputs else material.clearcoat
         lobes.append((amount, 0.0 if "clearcoat_roughness" in material.inputs else material.clearcoat_roughness))
-    return sum(amount / max(roughness**2, _MIN_ALPHA) ** 3 for amount, roughness in lobes) / math.tau + 1.0 / math.pi
+    return sum(amount / max(roughness**2, MIN_ALPHA) ** 3 for amount, roughness in lobes) / math.tau + 1.0 / math.pi
 
 
 def _peak(light: Light) -> float:

@@ -14,10 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from defshade_cli.plan.lights import PlannedLight
-from defshade_cli.plan.points import LARGE, apparent_size
+from defshade_cli.plan.points import LARGE, apparent_size, narrowest_lobe
 from defshade_cli.scene.environment import LUMINANCE
 from defshade_cli.scene.light import DistantLight, DomeLight, Light
-from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.shadow import PLAIN
 from defshade_cli.settings import RenderSettings
@@ -75,7 +74,7 @@ def _lamps(lights: Iterable[PlannedLight], scene: Scene, settings: RenderSetting
         planned
         for planned in lights
         if planned.points * settings.most_samples > 1
-        and not planned.is_whole
+        and not planned.samples_whole
         and apparent_size(planned.light, scene.roomy_bounds) >= least
         and _is_lamp(planned.light)
         and _is_plainly_hidden(planned.light, scene, settings, few)
@@ -89,14 +88,6 @@ def _is_plainly_hidden(light: Light, scene: Scene, settings: RenderSettings, mos
         return True
     linked = light.links is not None and not light.links.casts.all()
     return light.shadow == PLAIN and not linked and scene.triangle_count <= most
-
-
-def narrowest_lobe(materials: Iterable[Material]) -> float:
-    """The least alpha; what an image holds is not known here: it may be 0."""
-    lobes = [0.0 if "roughness" in m.inputs else m.roughness for m in materials]
-    coats = [m for m in materials if m.clearcoat > 0.0 or "clearcoat" in m.inputs]
-    lobes += [0.0 if "clearcoat_roughness" in m.inputs else m.clearcoat_roughness for m in coats]
-    return min(lobes, default=1.0) ** 2
 
 
 def _brightness(light: Light, scene: Scene) -> float:

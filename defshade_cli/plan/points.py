@@ -8,14 +8,17 @@ needs but one. Numbers are powers of two, at which the points' pattern is a net.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.scene.light import DistantLight, DomeLight, Light, SphereLight
+from defshade_cli.scene.material import Material
 from defshade_cli.settings import RenderSettings
 from defshade_cli.spaces import is_similarity
+
+MIN_ALPHA = 1e-4  # shaders/lib/constants.glsl
 
 _SMALL, LARGE = 0.03, 0.12
 """Radius over distance: up to the first one point does, up to the second a quarter of the largest lights' number."""
@@ -23,8 +26,12 @@ _SMALL, LARGE = 0.03, 0.12
 NEAREST_WHOLE = 6.0
 """Radii of a light around it in which no geometry lies, where it shows as a whole."""
 
-_SHOWN_WHOLE = 128
-"""Samples that show small lights as a whole; in later ones as many discs overlap at each place of the light."""
+_OVERLAPPING = 128
+"""Discs of a light that looks smaller than any lobe, at each place of it."""
+
+_FEW_SAMPLES, _FOR_EACH_LOBE, _MOST_WHOLE = 64, 20.0, 1024
+"""In which other small lights show as a whole: at least, for each lobe that the light would hold, and at most. More of
+them err less by points and rays than wholes do."""
 
 _PARTS = 8
 """Along a pixel's side, of all cells together: highlights that are smaller are spread over one of them."""
@@ -57,21 +64,35 @@ def cell_parts(settings: RenderSettings) -> int:
     return min(max(round(_PARTS / math.sqrt(settings.most_samples)), 1), 4)
 
 
-def is_whole(light: Light, points: int, size: float, settings: RenderSettings) -> bool:
-    """Does it show in lobes as a disc of its own size, its point of each sample casting its shadows alone?
+def samples_whole(light: Light, points: int, size: float, narrowest: float, settings: RenderSettings) -> int:
+    """The first samples, in which it shines from its centre and shows in lobes as a whole, its points casting shadows.
 
-    Round lights that look small: their points hardly differ in the diffuse and find few narrow lobes.
+    Round lights that look small: their points hardly differ in the diffuse and find few narrow lobes. 0 for others,
+    and for those that many samples see better by their points. narrowest: alpha.
     """
-    if _is_plain(settings) or points > 1:
-        return False
-    return 0.0 < size < LARGE and (
-        isinstance(light, DistantLight) or (isinstance(light, SphereLight) and is_similarity(light.world_from_light))
+    is_round = isinstance(light, DistantLight) or (
+        isinstance(light, SphereLight) and is_similarity(light.world_from_light)
     )
+    if _is_plain(settings) or points > 1 or not (is_round and 0.0 < size < LARGE):
+        return 0
+    lobes = (0.5 * size / max(narrowest, MIN_ALPHA)) ** 2
+    if lobes <= 1.0:
+        return _OVERLAPPING
+    few = min(max(_FOR_EACH_LOBE * lobes, _FEW_SAMPLES), _MOST_WHOLE)
+    return settings.most_samples if settings.most_samples <= few else 0
 
 
-def share_shown(index: int) -> float:
-    """Of the disc of a light that is_whole, in a sample: all of it at first, then ever less."""
-    return min(1.0, _SHOWN_WHOLE / (index + 1))
+def share_shown(index: int, whole: int) -> float:
+    """Of the disc of a light, in a sample, that shows as a whole in the first `whole` of them, then less and less."""
+    return min(1.0, whole / (index + 1))
+
+
+def narrowest_lobe(materials: Iterable[Material]) -> float:
+    """The least alpha; what an image holds is not known here: it may be 0."""
+    lobes = [0.0 if "roughness" in m.inputs else m.roughness for m in materials]
+    coats = [m for m in materials if m.clearcoat > 0.0 or "clearcoat" in m.inputs]
+    lobes += [0.0 if "clearcoat_roughness" in m.inputs else m.clearcoat_roughness for m in coats]
+    return min(lobes, default=1.0) ** 2
 
 
 def _is_plain(settings: RenderSettings) -> bool:

@@ -105,7 +105,9 @@ def _reasons(before: Scene, planned: Plan, scene: Scene, plan: Plan) -> Iterator
 
 def _light_terms(plan: Plan) -> list[tuple[Any, ...]]:
     """What plan/lights.py has chosen for each."""
-    return [(p.number, p.volume, p.reach, p.is_empty, p.groups, p.points, p.by_rays, p.is_whole) for p in plan.lights]
+    return [
+        (p.number, p.volume, p.reach, p.is_empty, p.groups, p.points, p.by_rays, p.samples_whole) for p in plan.lights
+    ]
 
 
 def _changed_rows(before: Scene, scene: Scene) -> NDArray[np.int64] | None:
