@@ -84,9 +84,18 @@ def test_a_group_is_what_its_lights_alone_give(pipeline: Pipeline) -> None:
     alone = replace(of, lights=tuple(light for light in of.lights if light.path.startswith("/rig")))
     grouped = drawn(pipeline, of, "light:/rig/*", samples=4)["light:/rig/*"]
     # Alone the lights are other numbers of the sampling pattern: at one point each they are the same.
-    single = drawn(pipeline, of, "light:/rig/*")["light:/rig/*"]
-    np.testing.assert_allclose(single, beauty(drawn(pipeline, alone, "beauty")), rtol=1e-4, atol=1e-5)
+    single, of_alone = drawn(pipeline, of, "light:/rig/*")["light:/rig/*"], beauty(drawn(pipeline, alone, "beauty"))
+    # Alone their maps lie elsewhere in the atlas: where a texel's slope may be taken two ways, rounding then decides.
+    assert np.isclose(single, of_alone, rtol=1e-4, atol=1e-5).mean() > 0.999
+    np.testing.assert_allclose(single, of_alone, rtol=1e-2, atol=1e-5)
     assert grouped.mean() == pytest.approx(single.mean(), rel=0.2)
+
+
+def test_a_group_without_shadows_is_to_the_bit_what_its_lights_alone_give(pipeline: Pipeline) -> None:
+    of = stage([SHINY])
+    alone = replace(of, lights=tuple(light for light in of.lights if light.path.startswith("/rig")))
+    grouped = drawn(pipeline, of, "light:/rig/*", shadows=False)["light:/rig/*"]
+    np.testing.assert_array_equal(grouped, beauty(drawn(pipeline, alone, "beauty", shadows=False)))
 
 
 def test_groups_go_by_group_name_or_path() -> None:
