@@ -13,11 +13,7 @@ void main() {
     if (stored == BACKGROUND_DEPTH) discard;
     vec3 l;
     vec3 irradiance = irradiance_from(light, position, l);
-    if (irradiance == vec3(0.0)) {
-        write_nothing();
-        return;
-    }
-    if (!is_lit_by(light, surface)) {
+    if (irradiance == vec3(0.0) || !is_lit_by(light, surface)) {
         write_nothing();
         return;
     }

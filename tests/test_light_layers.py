@@ -43,6 +43,10 @@ def stage(materials: Sequence[Material] = (SHINY, GLOWING)) -> Scene:
     return scene([sphere(0.8), quad(1.6, z=-1.0)], lights(), materials, camera(5.0), where)
 
 
+def rig_alone(of: Scene) -> Scene:
+    return replace(of, lights=tuple(light for light in of.lights if light.path.startswith("/rig")))
+
+
 @pytest.fixture(scope="module")
 def pipeline(gpu: Gpu) -> Pipeline:
     return Pipeline(gpu)
@@ -81,7 +85,7 @@ def test_lobes_are_those_of_the_materials(pipeline: Pipeline) -> None:
 
 def test_a_group_is_what_its_lights_alone_give(pipeline: Pipeline) -> None:
     of = stage([SHINY])
-    alone = replace(of, lights=tuple(light for light in of.lights if light.path.startswith("/rig")))
+    alone = rig_alone(of)
     grouped = drawn(pipeline, of, "light:/rig/*", samples=4)["light:/rig/*"]
     # Alone the lights are other numbers of the sampling pattern: at one point each they are the same.
     single, of_alone = drawn(pipeline, of, "light:/rig/*")["light:/rig/*"], beauty(drawn(pipeline, alone, "beauty"))
@@ -93,7 +97,7 @@ def test_a_group_is_what_its_lights_alone_give(pipeline: Pipeline) -> None:
 
 def test_a_group_without_shadows_is_to_the_bit_what_its_lights_alone_give(pipeline: Pipeline) -> None:
     of = stage([SHINY])
-    alone = replace(of, lights=tuple(light for light in of.lights if light.path.startswith("/rig")))
+    alone = rig_alone(of)
     grouped = drawn(pipeline, of, "light:/rig/*", shadows=False)["light:/rig/*"]
     np.testing.assert_array_equal(grouped, beauty(drawn(pipeline, alone, "beauty", shadows=False)))
 

@@ -76,8 +76,8 @@ def samples(count: int, kind: Filter = "box", width: float = 1.0, *, may_stop: b
         dx, dy = filter_offset(kind, width, place)
         (left, top), (right, bottom) = (filter_offset(kind, width, corner) for corner in _cell(place, count))
         cell = (0.5 * (left + right) - dx, 0.5 * (top + bottom) - dy, right - left, bottom - top)
-        place = (0.5 + dx, 0.5 + dy)
-        yield Sample(i, place, owen_sobol(i, _TEXEL), owen_sobol(i, _LENS), cell, 0 if may_stop else count)
+        pixel = (0.5 + dx, 0.5 + dy)
+        yield Sample(i, pixel, owen_sobol(i, _TEXEL), owen_sobol(i, _LENS), cell, 0 if may_stop else count)
 
 
 def _cell(place: Pair, count: int) -> tuple[Pair, Pair]:

@@ -25,7 +25,7 @@ def view_record(plan: Plan, layout: Layout, sample: Sample = CENTRE) -> NDArray[
     clip_from_relative = clip_from_camera(camera, window, plan.clip, standard) @ inverse_rigid(relative_from_camera)
     view["clip_from_relative"] = clip_from_relative.T
     view["relative_from_camera"] = relative_from_camera.T
-    view["first"], view["right"], view["down"] = _rays(camera, window, plan.size)
+    view["first"], view["right"], view["down"] = _rays(relative_from_camera, window, plan)
     view["depth_coefficients"] = depth_coefficients(camera, plan.clip, standard)
     view["size"], view["origin"] = plan.size, plan.window.origin
     view["exposure"] = plan.exposure
@@ -53,12 +53,12 @@ def seen_window(plan: Plan, sample: Sample) -> Window:
     return left - dx, right - dx, bottom - dy, top - dy
 
 
-def _rays(camera: Camera, window: Window, size: tuple[int, int]) -> Matrix:
+def _rays(relative_from_camera: Matrix, window: Window, plan: Plan) -> Matrix:
     """(3, 3): from the eye to the top left, one unit ahead in perspective; and from pixel to pixel, right and down."""
-    left, right, bottom, top = window
-    ahead = -1.0 if camera.projection == "perspective" else 0.0
-    rays = [[left, top, ahead], [(right - left) / size[0], 0.0, 0.0], [0.0, (bottom - top) / size[1], 0.0]]
-    matrix: Matrix = np.array(rays) @ rigid(camera.world_from_camera)[:3, :3].T
+    (left, right, bottom, top), (width, height) = window, plan.size
+    ahead = -1.0 if plan.camera.projection == "perspective" else 0.0
+    rays = [[left, top, ahead], [(right - left) / width, 0.0, 0.0], [0.0, (bottom - top) / height, 0.0]]
+    matrix: Matrix = np.array(rays) @ relative_from_camera[:3, :3].T
     return matrix
 
 

@@ -25,8 +25,8 @@ vec3 likely(vec3 one, vec3 other) {
 // How the normal changes from this pixel to the next, by that of its neighbours that is the less likely to lie beyond an edge.
 // `within` is the change within its two by two pixels; the other neighbour is fetched.
 vec3 turn_along(vec3 normal, ivec2 pixel, ivec2 next, vec3 within) {
-    ivec2 last = ivec2(view.size) - 1, parity = pixel & next;
-    bool is_second = parity != ivec2(0);
+    ivec2 last = ivec2(view.size) - 1;
+    bool is_second = (pixel & next) != ivec2(0);
     ivec2 apart = is_second ? pixel + next : pixel - next, inside = clamp(apart, ivec2(0), last);
     vec3 beyond = read_planes(inside).normal - normal;
     if (!is_second) beyond = -beyond;
