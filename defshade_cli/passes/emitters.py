@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.dataclass import dataclass
 from defshade_cli.image.environment import sky_of
+from defshade_cli.passes.lattices import Triple
 from defshade_cli.passes.sampling import Sample, samples
 from defshade_cli.passes.shadow_atlas import AtlasRoom
 from defshade_cli.passes.shadow_cameras import ShadowExtent, shadow_cameras
@@ -22,7 +23,7 @@ from defshade_cli.plan.points import share_shown
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.emission import Emitter, emitter_at, far_field, sky_emitter
 from defshade_cli.scene.environment import Environment
-from defshade_cli.scene.light import DomeLight, RectLight
+from defshade_cli.scene.light import DomeLight, Light, RectLight
 from defshade_cli.scene.mesh_light import MeshLight
 from defshade_cli.scene.scene import Scene
 from defshade_cli.spaces import Window
@@ -78,19 +79,25 @@ def _emitters(
         directions = [sky_emitter(light, sky, u[:2], 1.0 / count, guide, balance) for u in places]
         return [direction.shared_by(plan.samples) for direction in directions]
     if planned.samples_whole:
-        point = emitter_at(light, _MIDDLE if plan.samples == 1 else sample.on_shape(number), light.position)
+        point = emitter_at(light, _MIDDLE if plan.samples == 1 else sample.on_round(number), light.position)
         return [point.shown_as(light, share_shown(sample.index, planned.samples_whole))]
     if plan.samples * planned.points == 1:
         return [far_field(light)]
     towards = middle_of(extent, plan)
-    is_drawn = isinstance(light, MeshLight) or (isinstance(light, RectLight) and light.radiance_map is not None)
-    place = sample.on_light if is_drawn else sample.on_shape
+    place = _place_on(light, sample)
     places = [place(number, k, planned.points) for k in range(planned.points)]
     points = [emitter_at(light, u, towards, inside=planned.is_empty) for u in places]
     if isinstance(light, RectLight) and light.radiance_map:
         mean = _mean_weight(light.radiance_map, number, planned.points, plan.samples)
         points = [replace(point, intensity=point.intensity / mean) for point in points]
     return [point.one_of(planned.points).shared_by(plan.samples) for point in points]
+
+
+def _place_on(light: Light, sample: Sample) -> Callable[[int, int, int], Triple]:
+    """By its shape; where triangles or texels are drawn first, each sample by itself."""
+    if isinstance(light, MeshLight) or (isinstance(light, RectLight) and light.radiance_map):
+        return sample.on_light
+    return sample.on_rectangle if isinstance(light, RectLight) else sample.on_round
 
 
 @lru_cache(maxsize=2)

@@ -8,22 +8,19 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 
 from defshade_cli.dataclass import dataclass
 from defshade_cli.passes.filters import filter_offset
+from defshade_cli.passes.lattices import MOST_ON_LATTICE, Triple, even_grid, spiral
 from defshade_cli.settings import Filter
 
 Pair = tuple[float, float]
-Triple = tuple[float, float, float]
+Lattice = Callable[[int, int], Triple]
 
 _MASK = 0xFFFFFFFF
-_GOLDEN, _ROOT_3 = 0.6180339887498949, 0.7320508075688772
 _PIXEL, _TEXEL, _LENS, _LIGHTS = range(4)
-
-_MOST_ON_LATTICE = 64
-"""Points of a light; more of them gain nothing by it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +46,21 @@ class Sample:
 
     def on_light(self, number: int, k: int = 0, of: int = 1) -> Triple:
         """The k-th of some places on the number-th light; lights with a surface take the first two coordinates."""
-        return lattice(k, of) if self is CENTRE else owen_sobol_3d(self.index * of + k, _LIGHTS + number)
+        return spiral(k, of) if self is CENTRE else owen_sobol_3d(self.index * of + k, _LIGHTS + number)
 
-    def on_shape(self, number: int, k: int = 0, of: int = 1) -> Triple:
+    def on_round(self, number: int, k: int = 0, of: int = 1) -> Triple:
         """The same on a light that shines alike all over, to which a few samples bring a lattice together."""
+        return self._together(spiral, number, k, of)
+
+    def on_rectangle(self, number: int, k: int = 0, of: int = 1) -> Triple:
+        """The same on one whose edges do not join, as those of a disk's angles do."""
+        return self._together(even_grid, number, k, of)
+
+    def _together(self, lattice: Lattice, number: int, k: int, of: int) -> Triple:
+        if self is CENTRE:
+            return lattice(k, of)
         count = self.among * of
-        if not 0 < count <= _MOST_ON_LATTICE:
+        if not 0 < count <= MOST_ON_LATTICE:
             return self.on_light(number, k, of)
         return lattice(_order(count, _LIGHTS + number)[self.index * of + k], count)
 
@@ -86,14 +92,6 @@ def _cell(place: Pair, count: int) -> tuple[Pair, Pair]:
     columns, rows = 2 ** (bits - bits // 2), 2 ** (bits // 2)
     x, y = math.floor(place[0] * columns), math.floor(place[1] * rows)
     return (x / columns, y / rows), ((x + 1) / columns, (y + 1) / rows)
-
-
-def lattice(k: int, count: int) -> Triple:
-    """The k-th of `count` points as even as few can be: Fibonacci's lattice, and multiples of √3 for depth.
-
-    On a disk's polar coordinates this is the spiral of a sunflower (Vogel 1979).
-    """
-    return (k + 0.5) / count, (0.5 + k * _GOLDEN) % 1.0, (0.5 + k * _ROOT_3) % 1.0
 
 
 @cache
