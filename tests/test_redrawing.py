@@ -12,6 +12,7 @@ import pytest
 
 from build import scene, sun
 from defshade_cli.image.film import Film
+from defshade_cli.passes.last_frame import LastFrame
 from defshade_cli.plan import make_plan, plan_after
 from defshade_cli.rendering import Renderer, run
 from defshade_cli.settings import RenderJob, RenderSettings
@@ -35,6 +36,29 @@ BULB = f"""def SphereLight "bulb" {{
     {move(3, 5, 2)}
 }}
 """
+FADING = BULB.replace('"bulb"', '"bulb" (prepend apiSchemas = ["ShadowAPI"])').replace(
+    "float inputs:radius",
+    "float inputs:shadow:distance = 4\n    float inputs:shadow:falloff = 3\n    float inputs:radius",
+)
+PANEL = f"""def RectLight "panel" {{
+    float inputs:intensity = 5
+    float inputs:width = 3
+    float3 xformOp:rotateXYZ = (-80, 10, 0)
+    {move(0, 7, 1).replace('["', '["xformOp:rotateXYZ", "')}
+}}
+"""
+AROUND = "".join(
+    f"""def SphereLight "bulb_{number}" {{
+    float inputs:intensity = 200
+    float inputs:radius = 0.05
+    {move(x, 2.5, 3)}
+}}
+def Sphere "ball_{number}" {{
+    {move(x, -0.2, -2)}
+}}
+"""
+    for number, x in enumerate((-4, 0, 4))
+)
 FLOOR = f"""def Cube "floor" {{
     double size = 40
     {move(y=-21)}
@@ -120,10 +144,19 @@ def drawn(job: RenderJob, renderer: Renderer) -> tuple[list[Film], list[str]]:
         (BALL, {"layers": ("motionForward", "motionBackward")}),
         (BALL, {"shadows": True, "layers": ("beauty", "shadow")}),
         (HIGHEST, {"shadows": True}),
+        (AROUND + BALL, {"shadows": True}),
+        (AROUND + BALL, {"shadows": True, "lighting": "tiles"}),
+        (AROUND + BALL, {"shadows": True, "lighting": "volumes"}),
+        (FADING.replace("bulb", "fading") + BALL, {"shadows": True}),
+        (GLASS, {"shadows": True}),
+        (PANEL + BALL, {"shadows": True, "light_points": 2}),
         (BALL, {"shadows": True, "samples": 3, "lighting": "volumes"}),
         (GLASS, {"shadows": True, "samples": 2, "lighting": "tiles"}),
     ],
-    ids=["plain", "data", "volumes", "tiles", "glass", "instances", "motion", "shadows", "highest", "soft", "thin"],
+    ids=[
+        *("plain", "data", "volumes", "tiles", "glass", "instances", "motion", "shadows", "highest"),
+        *("around", "around tiles", "around volumes", "fading", "glassy", "panel", "soft", "thin"),
+    ],
 )
 def test_a_part_is_drawn_and_the_picture_is_equal(
     moving: str, settings: dict[str, Any], tmp_path: Path, renderer: Renderer
@@ -136,6 +169,18 @@ def test_a_part_is_drawn_and_the_picture_is_equal(
         assert film.manifests == alone.manifests
         for name, pixels in alone.layers.items():
             np.testing.assert_array_equal(film.layers[name], pixels, err_msg=name)
+
+
+def test_shadows_that_stay_are_not_drawn_again(
+    tmp_path: Path, renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn_tiles: list[Any] = []
+    keep = LastFrame.keep
+    monkeypatch.setattr(LastFrame, "keep", lambda *told: (drawn_tiles.append(told[2]), keep(*told)))
+    job = job_of(SUN + BULB + FLOOR + BALL, tmp_path, (1.0, 2.0, 3.0), {"shadows": True, "motion_blur": False})
+    drawn(job, renderer)
+    assert drawn_tiles[0] is None
+    assert all(0.1 < tiles.mean() < 0.6 for tiles in drawn_tiles[1:])
 
 
 @pytest.mark.parametrize(

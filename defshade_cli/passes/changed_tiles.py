@@ -26,7 +26,11 @@ def changed_tiles(plan: Plan) -> NDArray[np.bool_] | None:
     boxes = plan.redrawing.boxes
     if boxes is None:
         return None
-    tiles = _tiles_of(_rectangles(boxes, plan), plan.size)
+    return worthwhile(_tiles_of(_rectangles(boxes, plan), plan.size))
+
+
+def worthwhile(tiles: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
+    """The same (R, C); None for so many that all of the image is drawn."""
     return tiles if tiles.mean() < _WORTHWHILE else None
 
 

@@ -16,12 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.planes import read_source
 from defshade_cli.gpu.records import record
 from defshade_cli.gpu.residence import LIGHT_BLOCK, LIGHT_LISTS, RecordBuffer
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer
-from defshade_cli.passes.light_lists import TILE, list_lights, tile_boxes, tile_grid
+from defshade_cli.passes.light_lists import TILE, list_lights
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.light_traits import Traits, common_traits, lights_source
 from defshade_cli.passes.lighting import LightingVariant
@@ -29,10 +28,10 @@ from defshade_cli.passes.sampling import Sample
 from defshade_cli.passes.screen import Screen, regions_of
 from defshade_cli.passes.shadow_atlas import ShadowAtlas, kind_of
 from defshade_cli.passes.tables import NO_TABLES, LightTables
-from defshade_cli.passes.view import placement, seen_window
+from defshade_cli.passes.tile_depths import TileDepths, boxes_at
+from defshade_cli.passes.view import placement
 from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.plan.bounds import LightBounds
-from defshade_cli.settings import Layout
 from defshade_cli.spaces import inverse_rigid
 
 _MOST_LIGHTS = 256
@@ -47,17 +46,15 @@ class LightTiles:
         self._most = min(_MOST_LIGHTS, gpu.max_uniform_bytes // record("Light").itemsize)
         self._block = RecordBuffer(gpu, LIGHT_BLOCK, uniform=True)
         self._lists = RecordBuffer(gpu, LIGHT_LISTS)
-        self._depth_ranges = cache(lambda *kind: DepthRangesPass(gpu, *kind))
+        self._depths = TileDepths(gpu, frame)
         self._screen = Screen(gpu)
         self._array = cache(lambda variant, common: self._screen.array(_compile(gpu, variant, common, self._most)))
 
     def begin(self, gbuffer: GBuffer, plan: Plan, sample: Sample) -> None:
         """What the tiles show, by the GBuffer of a sample."""
-        self._plan, perspective = plan, plan.camera.projection == "perspective"
-        ranges = self._depth_ranges(gbuffer.layout, perspective)
-        depths = ranges.read(gbuffer, self._frame, plan.size)
+        self._plan, depths = plan, self._depths.read(gbuffer, plan)
         self._runs = self._frame.tile_runs(depths.shape[1::-1])
-        self._boxes = tile_boxes(depths, seen_window(plan, sample), plan.size, perspective=perspective)
+        self._boxes = boxes_at(depths, plan, sample)
         self._camera_from_relative = inverse_rigid(placement(plan.camera, sample))
 
     def add(
@@ -98,26 +95,6 @@ class LightTiles:
         self._runs.write(lists.runs)
         self._screen.cover(regions_of(lists.runs[..., 1] > 0, TILE, self._plan.size))
         self._screen.draw(array)
-
-
-class DepthRangesPass:
-    """The depths between which a tile's pixels lie; compiled for a layout and a projection."""
-
-    def __init__(self, gpu: Gpu, layout: Layout, perspective: bool) -> None:
-        self._context, self._screen = gpu.context, Screen(gpu)
-        generated = {"generated/planes.glsl": read_source((), layout)}
-        defines = [f"LIGHT_TILE {TILE}"] + ["ORTHOGRAPHIC"] * (not perspective)
-        program = gpu.shaders.program("screen.vert", "depth_ranges.frag", defines=defines, generated=generated)
-        self._array = self._screen.array(program)
-
-    def read(self, gbuffer: GBuffer, frame: Frame, size: tuple[int, int]) -> NDArray[np.float64]:
-        """(rows, columns, 2) nearest and farthest planar depth, the other way round in tiles without geometry."""
-        target = frame.of_tiles("range", 2, tile_grid(size))
-        target.framebuffer.use()
-        self._context.enable_only(moderngl.NOTHING)
-        gbuffer.bind(self._array.program)
-        self._screen.draw(self._array)
-        return target.read("range").astype(np.float64)
 
 
 def _compile(gpu: Gpu, variant: LightingVariant, common: Traits, most: int) -> moderngl.Program:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -15,14 +15,15 @@ from defshade_cli.gpu.planes import MOST_TARGETS, Plane
 from defshade_cli.gpu.residence import LIGHTS, MOTIONS, VIEW_BLOCK, DrawList, GpuScene, RecordBuffer
 from defshade_cli.image.film import Film, Sampling
 from defshade_cli.passes.accumulation import AccumulationPass
-from defshade_cli.passes.changed_tiles import beside, changed_tiles
+from defshade_cli.passes.changed_tiles import beside, changed_tiles, worthwhile
 from defshade_cli.passes.debug_volumes import DebugVolumesPass, laid_over
 from defshade_cli.passes.emission import EmissionPass
-from defshade_cli.passes.emitters import LitSample, light_batches, middle_of, shadow_extent
+from defshade_cli.passes.emitters import light_batches, middle_of, shadow_extent
 from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
 from defshade_cli.passes.identification import Manifests, Mattes, id_manifests
+from defshade_cli.passes.last_frame import LastFrame, Tiles
 from defshade_cli.passes.light_lists import TILE
 from defshade_cli.passes.light_records import light_records
 from defshade_cli.passes.light_targets import LightTargets
@@ -35,6 +36,7 @@ from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
 from defshade_cli.passes.screen import Narrowing, Screen, TileMask
 from defshade_cli.passes.shadow_atlas import ShadowAtlas
+from defshade_cli.passes.shadow_maps import MapRequest
 from defshade_cli.passes.shadows import ShadowPass, ShadowVariant
 from defshade_cli.passes.sharp_tiles import SharpTilesPass
 from defshade_cli.passes.sky_guide import NO_GUIDES, SkyGuides, scout, sky_guides
@@ -52,13 +54,17 @@ Layers = dict[str, NDArray[np.float32]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Canvas:
-    """What the samples of a frame are lit on, what is known of its domes' skies, and what rays along lobes read."""
+    """What the samples of a frame are lit on, what is known of its domes' skies, and what rays along lobes read.
+
+    maps: of each batch of lights, those that are drawn already.
+    """
 
     gbuffer: GBuffer
     targets: LightTargets
     visibility: SkyVisibility | None
     guides: SkyGuides
     rays: LobeRays | None
+    maps: Sequence[ShadowAtlas] = ()
 
 
 class Pipeline:
@@ -94,6 +100,7 @@ class Pipeline:
         self._tables = TableStore(gpu)
         self._accumulation = AccumulationPass(gpu, self._frame, self._screen)
         self._debug_volumes_pass = cache(lambda: DebugVolumesPass(gpu))
+        self._last = LastFrame(gpu, self._frame)
         self._stopping = Stopping(gpu, self._frame, self._screen, self._narrowing)
 
     @property
@@ -122,24 +129,56 @@ class Pipeline:
         uploaded: of this scene, where that has been done before.
         before: the film of the frame that the plan's `redrawing` is about.
         """
-        tiles = changed_tiles(plan) if before else None
-        with self._gpu.watched(), self._narrowing.of(tiles, TILE, plan.size):
-            film = self._film(scene, plan, moments, uploaded)
+        with self._gpu.watched():
+            draws = uploaded or self._resident(scene, plan)
+            tiles, maps = self._changes(draws, scene, plan, before) if before else (None, ())
+            with self._narrowing.of(tiles, TILE, plan.size):
+                film = self._film(draws, scene, plan, moments, maps)
         if before and tiles is not None:
             layers = beside(before.layers, film.layers, tiles)
             data = {name: layers[name] for name in plan.data_layers}
             film = replace(film, layers=layers, manifests=film.manifests | id_manifests(data, scene))
+        self._last.keep(film, tiles)
         return film
 
+    def _changes(
+        self, draws: DrawList, scene: Scene, plan: Plan, before: Film
+    ) -> tuple[Tiles | None, Sequence[ShadowAtlas]]:
+        """The tiles in which something may differ from the frame before, and its shadow maps where those tell it.
+
+        None for all of the image.
+        """
+        tiles, boxes = changed_tiles(plan), plan.redrawing.boxes
+        if tiles is None or boxes is None or not plan.redrawing.by_maps:
+            return tiles, ()
+        if not self._last.is_of(before):
+            return None, ()
+        tables, relative = self._tables.update(plan), boxes - plan.camera.position
+        batches = enumerate(light_batches(scene, plan, CENTRE) if plan.lit else ())
+        requests = [MapRequest.of(batch, plan, CENTRE, tables, number) for number, batch in batches]
+        shadow_pass = self._shadow_pass(ShadowVariant.of(draws, plan))
+        redrawn = [shadow_pass.redraw(draws, request, relative) for request in requests]
+        maps, changes = zip(*filter(None, redrawn), strict=True) if all(redrawn) else ((), ())
+        if len(maps) < len(requests):
+            return None, ()
+        gbuffer = self._frame.gbuffer(plan.size, plan.planes, plan.layout)
+        found = [change.all_behind() if plan.shadow_styles else change for each in changes for change in each]
+        tiles |= self._last.shadowed_tiles(found, gbuffer, plan)
+        return worthwhile(tiles), maps
+
     def _film(
-        self, scene: Scene, plan: Plan, moments: Iterator[ShutterSample] | None, uploaded: DrawList | None
+        self,
+        draws: DrawList,
+        scene: Scene,
+        plan: Plan,
+        moments: Iterator[ShutterSample] | None,
+        maps: Sequence[ShadowAtlas],
     ) -> Film:
-        draws = uploaded or self._resident(scene, plan)
         layers: Layers = {}
         manifests: Manifests = {}
         sampling = Sampling(1, 1.0, 1)
         if plan.sampled:
-            layers, manifests, sampling = self._sampled_layers(draws, scene, plan, moments)
+            layers, manifests, sampling = self._sampled_layers(draws, scene, plan, moments, maps)
         if plan.data_layers:
             draws = self._resident(scene, plan) if plan.moments else draws
             data = data_layers(self._data_planes(draws, plan), plan, scene)
@@ -171,10 +210,16 @@ class Pipeline:
     def planes(self, scene: Scene, plan: Plan) -> Planes:
         """The float GBuffer at the pixels' centres: what the float64 reference is evaluated on."""
         self._gpu.make_current()
+        self._last.forget()
         return self._drawn_planes(self._scene.update(scene, texels=plan.texels, thin=plan.thin), plan.planes, plan)
 
     def _sampled_layers(
-        self, draws: DrawList, scene: Scene, plan: Plan, moments: Iterator[ShutterSample] | None
+        self,
+        draws: DrawList,
+        scene: Scene,
+        plan: Plan,
+        moments: Iterator[ShutterSample] | None,
+        maps: Sequence[ShadowAtlas],
     ) -> tuple[Layers, Manifests, Sampling]:
         """What is a mean over samples or tells of them, and what ids in it stand for."""
         mattes = Mattes(scene, plan)
@@ -186,7 +231,7 @@ class Pipeline:
         hidden = any(plan.hides_sky(dome) for dome in plan.domes)
         visibility = SkyVisibility.of(self._frame, plan.size) if hidden else None
         tables = self._tables.update(plan)
-        canvas = _Canvas(gbuffer, targets, visibility, guides, self._lobe_rays(scene, plan, guides, tables))
+        canvas = _Canvas(gbuffer, targets, visibility, guides, self._lobe_rays(scene, plan, guides, tables), maps)
         self._accumulation.begin(plan.size, plan.samples)
         self._stopping.begin(plan)
         for sample in samples(plan.samples, plan.filter, plan.filter_width, may_stop=plan.tracks_error):
@@ -237,8 +282,11 @@ class Pipeline:
         openness = self._sky_visibility_pass(variant) if visibility else None
         if openness and visibility:
             openness.begin_sample(visibility)
-        for batch in light_batches(scene, plan, sample, canvas.guides) if plan.lit else ():
-            shadows = self._shadow_maps(draws, batch, plan, sample, tables) if plan.shadows else None
+        batches = light_batches(scene, plan, sample, canvas.guides) if plan.lit else ()
+        for number, batch in enumerate(batches):
+            known = canvas.maps[number] if canvas.maps else None
+            request = MapRequest.of(batch, plan, sample, tables, 0 if self._lone else number)
+            shadows = self._shadow_maps(draws, plan, request, known) if plan.shadows else None
             lights, emitters = [lit.planned for lit in batch], [lit.emitter for lit in batch]
             records = light_records(lights, emitters, plan.camera.position, shadows, tables)
             self._lights.write(records)
@@ -290,21 +338,11 @@ class Pipeline:
         target = self._frame.radiance("debug", plan.size, gbuffer)
         return self._debug_volumes_pass().draw(lights, target, gbuffer.layout)
 
-    def _shadow_maps(
-        self, draws: DrawList, batch: list[LitSample], plan: Plan, sample: Sample, tables: LightTables
-    ) -> ShadowAtlas:
-        variant = ShadowVariant(
-            plan.cutout,
-            plan.transparent,
-            draws.color_varies,
-            draws.texture_groups,
-            plan.shadow_linked,
-            plan.render_space,
-            draws.many_uvs,
-        )
-        cameras = [lit.shadow_cameras for lit in batch]
-        casters = [tables.links.casts.get(lit.planned.light, ALL_LINKED) for lit in batch]
-        return self._shadow_pass(variant).draw(draws, cameras, plan.shadow_resolution, sample.texel_offset, casters)
+    def _shadow_maps(self, draws: DrawList, plan: Plan, request: MapRequest, known: ShadowAtlas | None) -> ShadowAtlas:
+        shadow_pass = self._shadow_pass(ShadowVariant.of(draws, plan))
+        atlas = known or shadow_pass.draw(draws, request)
+        shadow_pass.show(atlas)
+        return atlas
 
     def _data_planes(self, draws: DrawList, plan: Plan) -> Planes:
         """Planes for the data layers: the beauty's own where it drew them in float at the pixels' centres.

@@ -20,12 +20,9 @@ from defshade_cli.gpu.records import block_source, record
 from defshade_cli.gpu.residence import SHADOW_BLOCK
 from defshade_cli.gpu.shaders import set_uniforms
 from defshade_cli.passes.view import clip_from_camera, depth_coefficients
-from defshade_cli.plan.shadow_maps import CUBE_FACES
+from defshade_cli.plan.shadow_maps import ATLAS, CUBE_FACES
 from defshade_cli.scene.camera import Camera
 from defshade_cli.spaces import Matrix
-
-ATLAS = 4096
-"""Texels along a side of the atlas."""
 
 ShadowKind = Literal["map", "cube"]
 
@@ -71,13 +68,14 @@ def kind_of(maps: int) -> tuple[ShadowKind, ...]:
 class ShadowAtlas:
     """The maps of some lights. first, count: (L,) of each light, in the order they were given.
 
-    first_record: (L,) of those that have a single map.  uniforms: what the shaders read of cubes.
+    first_record: (L,) of those that have a single map.  records: of these.  uniforms: what the shaders read of cubes.
     """
 
     depth: moderngl.Texture
     first: NDArray[np.uint32]
     count: NDArray[np.uint32]
     first_record: NDArray[np.uint32]
+    records: NDArray[Any]
     uniforms: Mapping[str, tuple[Any, ...]]
 
     def bind(self, program: moderngl.Program) -> moderngl.Texture:
@@ -98,6 +96,11 @@ def _moved(camera: Camera, resolution: int, jitter: tuple[float, float]) -> Came
     left, right, bottom, top = camera.window
     dx, dy = jitter[0] * (right - left) / resolution, jitter[1] * (top - bottom) / resolution
     return replace(camera, window=(left + dx, right + dx, bottom + dy, top + dy))
+
+
+def places_from_relative(camera: Camera, resolution: int) -> Matrix:
+    """(4, 4) what finds a receiver in its map: texels and stored depth, times w."""
+    return _atlas_from_clip(0, 0, resolution) @ _nearer(camera, resolution) @ camera.camera_from_world
 
 
 def clip_from_relative(camera: Camera) -> Matrix:

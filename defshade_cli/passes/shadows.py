@@ -5,9 +5,9 @@ Maps are moved by a fraction of a texel every sample, so that their grid average
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from functools import cache
 
 import moderngl
 import numpy as np
@@ -20,16 +20,10 @@ from defshade_cli.gpu.residence import SHADOW_BLOCK, DrawList, RecordBuffer
 from defshade_cli.gpu.textures import textures_source
 from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.culling import CommandBuffer, may_see
-from defshade_cli.passes.shadow_atlas import (
-    ATLAS,
-    ShadowAtlas,
-    clip_from_relative,
-    cube_uniforms,
-    map_records,
-    placed,
-    viewport,
-)
-from defshade_cli.plan.shadow_maps import CUBE_FACES
+from defshade_cli.passes.shadow_atlas import ShadowAtlas, places_from_relative
+from defshade_cli.passes.shadow_changes import MapChange, Region, map_change, window_of
+from defshade_cli.passes.shadow_maps import MapRequest, Maps, MapTarget, shadow_atlas
+from defshade_cli.plan import Plan
 from defshade_cli.scene.camera import Camera
 
 _DEPTH_OFFSET = (0.0, -1.0)
@@ -48,6 +42,19 @@ class ShadowVariant:
     space: RenderSpace = REC709
     many_uvs: bool = False
 
+    @classmethod
+    def of(cls, draws: DrawList, plan: Plan) -> ShadowVariant:
+        """For what is drawn."""
+        return cls(
+            plan.cutout,
+            plan.transparent,
+            draws.color_varies,
+            draws.texture_groups,
+            plan.shadow_linked,
+            plan.render_space,
+            draws.many_uvs,
+        )
+
     @property
     def defines(self) -> list[str]:
         """The shader's macros."""
@@ -57,7 +64,7 @@ class ShadowVariant:
 
 
 class ShadowPass:
-    """Draws shadow maps into an atlas; what one call draws the next overwrites."""
+    """Draws shadow maps into atlases; what one call draws the next of the same number overwrites."""
 
     def __init__(self, gpu: Gpu, variant: ShadowVariant) -> None:
         generated = {"generated/textures.glsl": textures_source(variant.texture_groups)}
@@ -67,58 +74,68 @@ class ShadowPass:
             gpu.shaders.program("shadow.vert", "shadow.frag", defines=kind.defines, generated=generated)
             for kind in kinds
         ]
-        self._depth = gpu.keep(gpu.depth_texture((ATLAS, ATLAS)))
-        self._framebuffer = gpu.keep(gpu.context.framebuffer([], self._depth))
+        self._targets = cache(lambda number: MapTarget(gpu))
         self._records = RecordBuffer(gpu, SHADOW_BLOCK, uniform=True)
         self._commands = CommandBuffer(gpu)
 
-    def draw(
-        self,
-        draws: DrawList,
-        cameras: Sequence[tuple[Camera, ...]],
-        resolution: int,
-        jitter: tuple[float, float],
-        casters: Sequence[int] = (),
-    ) -> ShadowAtlas:
-        """The maps of each light's cameras, no more than the atlas holds; a light may have none.
+    def draw(self, draws: DrawList, request: MapRequest) -> ShadowAtlas:
+        """All that is asked for."""
+        target, maps = self._targets(request.number), Maps.of(request)
+        target.begin(maps)
+        self._draw_maps(draws, target, maps, dict.fromkeys(range(len(maps.cameras))))
+        return shadow_atlas(target, request)
 
-        resolution: texels along a map's side.  jitter: in texels.
-        casters: of each light, the place of its casters' link bits; all cast where none are given.
+    def redraw(
+        self, draws: DrawList, request: MapRequest, boxes: NDArray[np.float64]
+    ) -> tuple[ShadowAtlas, list[MapChange]] | None:
+        """The same, but only what boxes (N, 2, 3) relative to the eye cover of maps that are there; and what changes.
+
+        None where the atlas holds others.
         """
-        count = np.array([len(light) for light in cameras], np.uint32)
-        first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.uint32)
-        maps = placed(cameras, resolution, jitter)
-        self._framebuffer.use()
-        if maps:
-            columns = min(len(maps), ATLAS // resolution)
-            rows = -(-len(maps) // columns)
-            self._framebuffer.clear(depth=0.0, viewport=(0, 0, columns * resolution, rows * resolution))
-            self._draw_maps(draws, maps, resolution, np.repeat(casters, count) if len(casters) else np.array([]))
-        self._records.write(map_records(maps, first[count == 1], resolution))
-        cubes = first[count == CUBE_FACES]
-        uniforms = cube_uniforms(maps[cubes[0]], resolution) if len(cubes) else {}
-        first_record = (np.cumsum(count == 1) - 1).astype(np.uint32)
-        return ShadowAtlas(self._depth, first, count, first_record, uniforms)
+        target, maps, side = self._targets(request.number), Maps.of(request), request.resolution
+        if not maps.are_alike(target.maps):
+            return None
+        places = [places_from_relative(camera, side) for camera in maps.cameras]
+        found = {slot: window_of(boxes, place, side) for slot, place in enumerate(places)}
+        windows = {slot: window for slot, window in found.items() if window}
+        target.use()
+        before = [target.read(slot, window.read) for slot, window in windows.items()]
+        for slot, window in windows.items():
+            target.empty(slot, window.drawn)
+        self._draw_maps(draws, target, maps, {slot: window.drawn for slot, window in windows.items()})
+        after = [target.read(slot, window.read) for slot, window in windows.items()]
+        changes = [
+            map_change(old, new, window, places[slot], side)
+            for (slot, window), old, new in zip(windows.items(), before, after, strict=True)
+        ]
+        return shadow_atlas(target, request), [change for change in changes if change]
 
-    def _draw_maps(self, draws: DrawList, maps: Sequence[Camera], resolution: int, casters: NDArray[Any]) -> None:
-        """Each map with the commands that it may see, those first that let nothing through."""
+    def show(self, atlas: ShadowAtlas) -> None:
+        """Let shaders find its maps."""
+        self._records.write(atlas.records)
+
+    def _draw_maps(self, draws: DrawList, target: MapTarget, maps: Maps, parts: Mapping[int, Region | None]) -> None:
+        """Parts of maps, or all of them, with the commands that they may see, those first that let nothing through."""
         kinds = len(self._programs)
-        clips = [clip_from_relative(camera).T.astype(np.float32) for camera in maps]
-        self._commands.write([run for clip in clips for run in draws.runs(may_see(clip, draws.corners))[:kinds]])
+        seen = [may_see(maps.clip_of(slot, part), draws.corners) for slot, part in parts.items()]
+        if not seen:
+            return
+        self._commands.write([run for each in seen for run in draws.runs(each)[:kinds]])
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._context.depth_func = ">"
         self._context.polygon_offset = _DEPTH_OFFSET
         for kind, program in enumerate(self._programs):
             array = self._context.vertex_array(program, draws.vertices_of(program), draws.indices)
-            for slot, clip in enumerate(clips):
-                self._framebuffer.viewport = viewport(slot, resolution)
-                program["clip_from_relative"] = tuple(clip.ravel().tolist())
+            for number, (slot, part) in enumerate(parts.items()):
+                target.keep_to(slot, part)
+                program["clip_from_relative"] = tuple(maps.clips[slot].ravel().tolist())
                 if "towards_light" in program:
-                    program["towards_light"] = _towards(maps[slot])
+                    program["towards_light"] = _towards(maps.cameras[slot])
                 if "first_caster" in program:
-                    program["first_caster"] = int(casters[slot])
-                self._commands.render(array, slot * kinds + kind)
+                    program["first_caster"] = int(maps.casters[slot])
+                self._commands.render(array, number * kinds + kind)
             array.release()
+        target.keep_to(0, None)
         self._context.polygon_offset = 0.0, 0.0
 
 

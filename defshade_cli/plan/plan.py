@@ -25,7 +25,7 @@ from defshade_cli.plan.moments import count_moments, share_moments
 from defshade_cli.plan.opacity import is_transparent, thin_materials, thin_numbers
 from defshade_cli.plan.points import cell_parts, rays_a_sample
 from defshade_cli.plan.redrawing import WHOLE, Redrawing, find_redrawing
-from defshade_cli.plan.shadow_maps import count_maps, shadow_resolution
+from defshade_cli.plan.shadow_maps import ATLAS, MOST_KEPT, count_maps, shadow_resolution
 from defshade_cli.plan.solidity import solid_materials
 from defshade_cli.plan.texels import seen_texels
 from defshade_cli.scene.camera import Camera, image_size
@@ -237,6 +237,12 @@ class Plan:
     def maps_a_sample(self) -> int:
         """Shadow maps that a sample may need."""
         return sum(map(count_maps, self.lights))
+
+    @property
+    def keeps_maps(self) -> bool:
+        """Are its shadow maps so few that those of the next frame are drawn where they change?"""
+        texels = self.maps_a_sample * self.shadow_resolution**2
+        return self.shadows and self.samples == 1 and texels <= MOST_KEPT * ATLAS**2
 
     @property
     def profiles(self) -> tuple[IesProfile, ...]:

@@ -37,11 +37,13 @@ class Redrawing:
 
     boxes: (N, 2, 3) world space, around what changed as it was and as it is, and where shadows of it may fall.
     moved: instances that changed.
+    by_maps: where shadows of it fall is told by what changes in the shadow maps.
     """
 
     reason: str = ""
     boxes: NDArray[np.float64] | None = None
     moved: int = 0
+    by_maps: bool = False
 
 
 WHOLE = Redrawing("no frame before it is known")
@@ -58,6 +60,8 @@ def find_redrawing(before: Scene, planned: Plan, scene: Scene, plan: Plan) -> Re
     moved, radii = (np.concatenate(column) for column in zip(*places, strict=True))
     if not np.isfinite(moved).all():
         return Redrawing("what moves is not finite")
+    if plan.keeps_maps:
+        return Redrawing("", moved, len(changed), by_maps=True)
     shadowed = _shadowed(scene, plan, moved, radii)
     if shadowed is None:
         return Redrawing("shadows of what moves fall far and wide")

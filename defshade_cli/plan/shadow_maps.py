@@ -22,6 +22,12 @@ _FEW = range(2, 16)
 _TEXELS = 64 * FINEST**2
 """Of all maps of a sample."""
 
+ATLAS = 4096
+"""Texels along the side of what holds maps together."""
+
+MOST_KEPT = 4
+"""Atlases that keep their maps from frame to frame: 64 MiB each."""
+
 CUBE_FACES = 6
 """Maps of a point that has geometry all around."""
 
