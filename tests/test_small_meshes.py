@@ -19,13 +19,13 @@ INTERPOLATIONS: tuple[Interpolation, ...] = ("constant", "uniform", "varying", "
 
 
 def mesh(rng: np.random.Generator, scheme: Scheme, left_handed: bool) -> Polygons:
-    """Faces of 3 and 4 corners anywhere among some points."""
+    """Faces of 3 and 4 corners anywhere among some points, some of them holes."""
     counts = rng.integers(3, 5, rng.integers(1, 9))
     points = rng.normal(size=(rng.integers(4, 12), 3)).astype(np.float32)
     indices = rng.integers(0, len(points), counts.sum())
-    return Polygons(
-        points, counts, indices, np.arange(len(counts), dtype=np.int32), scheme=scheme, left_handed=left_handed
-    )
+    holes = rng.integers(0, len(counts), rng.integers(len(counts)) if rng.random() < 0.3 else 0)
+    faces = np.arange(len(counts), dtype=np.int32)
+    return Polygons(points, counts, indices, faces, holes, scheme=scheme, left_handed=left_handed)
 
 
 def dressed(rng: np.random.Generator, bare: Polygons) -> Polygons:

@@ -2,13 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import field
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from pxr import Usd
+from pxr import Usd, UsdGeom
+
+from defshade_cli.dataclass import dataclass
 
 _PRIMVARS, _INDICES, _NORMALS, _MATERIALS = "primvars:", ":indices", "primvars:normals", "material:"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Inherited:
+    """Primvars that a prim hands down to all below it: constant ones, its own or its ancestors'.
+
+    read: takes what is made of them, which is the same for thousands of prims.
+    """
+
+    primvars: Sequence[UsdGeom.Primvar]
+    read: dict[Hashable, Any] = field(default_factory=dict)
+
+
+NOTHING_INHERITED = Inherited(())
+
+
+def inheritable(prim: Usd.Prim) -> Inherited:
+    """What USD finds on a prim and above it for what stands below."""
+    found = UsdGeom.PrimvarsAPI(prim).FindInheritablePrimvars() if prim else ()
+    return Inherited(found) if found else NOTHING_INHERITED
 
 
 class Said(NamedTuple):
@@ -18,7 +41,7 @@ class Said(NamedTuple):
     binding: those of its relationships to materials, likewise.
     schemas: applied to it, those of its type too.
     is_leaf: no prim at all stands below; an instance is one.
-    primvars: may any lie on it, its own or an ancestor's?  inherits: may an ancestor's?
+    own_primvars: are any authored on it?  inherited: those of its ancestors.
     """
 
     path: str
@@ -28,8 +51,13 @@ class Said(NamedTuple):
     binding: tuple[str, ...]
     schemas: Sequence[str]
     is_leaf: bool
-    primvars: bool
-    inherits: bool = True
+    own_primvars: bool
+    inherited: Inherited
+
+    @property
+    def primvars(self) -> bool:
+        """May any lie on it?"""
+        return self.own_primvars or self.inherited is not NOTHING_INHERITED
 
 
 class _Names(NamedTuple):
@@ -42,11 +70,11 @@ class _Names(NamedTuple):
 
 
 def said_of(
-    prim: Usd.Prim, type_name: str | None = None, *, primvars_above: bool = True, clipped: bool = False
+    prim: Usd.Prim, type_name: str | None = None, inherited: Inherited | None = None, *, clipped: bool = False
 ) -> Said:
-    """primvars_above: may an ancestor have some?  clipped: value clips may say more than is authored, see has_clips.
+    """type_name, inherited: of the prim, where they are known.
 
-    type_name: of the prim, where it is known.
+    clipped: value clips may say more than is authored, see has_clips.
     """
     names, lying, binding, primvars = _sorted_out(
         tuple(prim.GetPropertyNames() if clipped else prim.GetAuthoredPropertyNames())
@@ -59,8 +87,8 @@ def said_of(
         binding,
         prim.GetAppliedSchemas(),
         not prim.GetAllChildrenNames(),
-        primvars or primvars_above,
-        primvars_above,
+        primvars,
+        inheritable(prim.GetParent()) if inherited is None else inherited,
     )
 
 

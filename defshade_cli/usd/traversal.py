@@ -28,7 +28,7 @@ from defshade_cli.usd.memory import Asked, Memory
 from defshade_cli.usd.models.draw_mode import FULL, handed_down, mode_above, takes_effect
 from defshade_cli.usd.polygons.polygons import Polygons
 from defshade_cli.usd.render_settings.render_pass import PassRules
-from defshade_cli.usd.said import Said, said_of
+from defshade_cli.usd.said import Said, inheritable, said_of
 from defshade_cli.usd.surfaces.geometry import Surface, is_time_varying
 from defshade_cli.usd.values import STANDS_NOWHERE
 from defshade_cli.usd.xform import IDENTITY, gf_matrix, matrix
@@ -117,7 +117,7 @@ class Traversal:
         kind = nature.kind
         if kind is Kind.SHADING or self._is_pruned(prim):
             return (), above
-        said = said_of(prim, nature.type_name, primvars_above=above.primvars, clipped=self._memory.clipped)
+        said = said_of(prim, nature.type_name, above.primvars, clipped=self._memory.clipped)
         here = self._stand(prim, above, nature, said)
         if here is None:
             return (), above
@@ -137,16 +137,17 @@ class Traversal:
         if said.is_leaf and not is_instance:
             return (), here
         chosen = Usd.TraverseInstanceProxies(predicate) if here.rig else predicate
-        return prim.GetFilteredChildren(chosen), here
+        below = here._replace(primvars=inheritable(prim)) if said.own_primvars else here
+        return prim.GetFilteredChildren(chosen), below
 
     def _stand(self, prim: Usd.Prim, above: Standing, nature: Nature, said: Said) -> Standing | None:
         """What `prim` hands down, None where it is invisible; of other than Imageables only the draw mode counts."""
         mode = handed_down(prim, above.draw_mode) if above.draw_mode else None
         if not nature.is_imageable:
-            return above._replace(draw_mode=mode, primvars=said.primvars)
+            return above._replace(draw_mode=mode)
         if _VISIBILITY in said.names and not self._is_visible(prim):
             return None
-        root_from_prim, in_world, purpose, _, rig, proxied, _ = above
+        root_from_prim, in_world, purpose, _, rig, proxied, primvars = above
         if _XFORM_OPS in said.names:
             local, resets = self._memory.xforms.GetLocalTransformation(prim)
             in_world |= resets
@@ -154,7 +155,7 @@ class Traversal:
         if _PURPOSE in said.names:
             authored = prim.GetAttribute(_PURPOSE)
             purpose = str(authored.Get()) if authored.HasAuthoredValue() else purpose
-        here = Standing(root_from_prim, in_world, purpose, mode, rig, proxied, said.primvars)
+        here = Standing(root_from_prim, in_world, purpose, mode, rig, proxied, primvars)
         return here.with_rig(prim) if nature.is_skel_root else here
 
     def _is_hidden(self, prim: Usd.Prim) -> bool:
@@ -322,7 +323,8 @@ class Traversal:
             self._prototypes[key] = None
             above = UsdGeom.Imageable(root.GetParent()).ComputePurposeInfo()
             purpose = str(above.purpose) if above.isInheritable else None
-            standing = Standing(purpose=purpose, draw_mode=mode_above(root), proxied=here.proxied, primvars=True)
+            primvars = inheritable(root.GetParent())
+            standing = Standing(IDENTITY, False, purpose, mode_above(root), None, here.proxied, primvars)
             self._prototypes[key] = self._read([root], standing, _PROTOTYPE_CHILDREN)
         pieces = self._prototypes[key]
         if pieces is None:

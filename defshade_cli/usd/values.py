@@ -19,8 +19,10 @@ def floats(value: object, width: int) -> NDArray[np.float32] | None:
         array = array[None]
     if array.shape[1:] != element:
         return None
+    if array.dtype == np.float32:
+        return array
     with np.errstate(over="ignore"):  # a double out of range becomes inf, which readers look for
-        return array.astype(np.float32, copy=False)
+        return array.astype(np.float32)
 
 
 FARTHEST = 1e18

@@ -23,6 +23,7 @@ from defshade_cli.errors import StageError
 from defshade_cli.scene.light import Light
 from defshade_cli.usd.materials.binding import NOTHING_BOUND, Bindings
 from defshade_cli.usd.polygons.primvars import read_display
+from defshade_cli.usd.said import NOTHING_INHERITED, Inherited
 from defshade_cli.usd.surfaces.geometry import Surface
 from defshade_cli.usd.values import within_reach
 from defshade_cli.usd.xform import IDENTITY
@@ -41,7 +42,7 @@ class Standing(NamedTuple):
     draw_mode: of the models below; None below what is no model, where there are no others.
     rig: the outermost SkelRoot.
     proxied: the prototype that is walked and an instance of it, by whose proxies its prims are known on the stage.
-    primvars: some may be inherited.
+    primvars: that are inherited below it; into a prototype USD lets none.
     """
 
     root_from_prim: Gf.Matrix4d = IDENTITY
@@ -50,7 +51,7 @@ class Standing(NamedTuple):
     draw_mode: str | None = None
     rig: Rig | None = None
     proxied: tuple[Sdf.Path, Sdf.Path] | None = None
-    primvars: bool = False
+    primvars: Inherited = NOTHING_INHERITED
 
     def on_stage(self, prim: Usd.Prim) -> Usd.Prim:
         """The prim, or the proxy of one in a prototype."""
@@ -69,7 +70,7 @@ class Standing(NamedTuple):
         proxy = self.on_stage(instance)
         rig = self.rig and type(self.rig)(proxy, IDENTITY, False)
         proxied = instance.GetPrototype().GetPath(), proxy.GetPath()
-        return Standing(rig=rig, proxied=proxied, primvars=self.primvars)
+        return Standing(rig=rig, proxied=proxied)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,8 +18,6 @@ from defshade_cli.usd.polygons.polygons import Interpolation, Polygons, Primvar
 from defshade_cli.usd.polygons.primvars import count_elements
 from defshade_cli.usd.polygons.told import Lying, Told
 
-_NO_HOLES = np.empty(0, np.int32)
-
 
 def check_all(meshes: Sequence[Told]) -> list[Polygons | None]:
     """The polygons of each mesh that is sound, None of any other."""
@@ -36,11 +34,15 @@ def check_all(meshes: Sequence[Told]) -> list[Polygons | None]:
 
 
 def _are_drawn(meshes: Sequence[Told]) -> list[bool]:
-    """Are all corners at points that exist, and all points finite?"""
+    """Are all corners at points that exist, all points finite, and all holes faces?"""
     if not meshes:
         return []
     within = _greatest([mesh.indices for mesh in meshes]) < [len(mesh.points) for mesh in meshes]
-    return (within & _are_finite([mesh.points for mesh in meshes])).tolist()
+    sound = within & _are_finite([mesh.points for mesh in meshes])
+    holed = [number for number, mesh in enumerate(meshes) if len(mesh.holes)]
+    if holed:
+        sound[holed] &= _greatest([meshes[n].holes for n in holed]) < [len(meshes[n].counts) for n in holed]
+    return sound.tolist()
 
 
 def _fits(mesh: Told) -> bool:
@@ -65,7 +67,7 @@ def _are_sound(lying: Sequence[Lying]) -> list[bool]:
     return sound.tolist()
 
 
-def _greatest(indices: Sequence[NDArray[np.int32]]) -> NDArray[np.uint32]:
+def _greatest(indices: Sequence[NDArray[np.integer]]) -> NDArray[np.uint32]:
     """(M,) of each array, where what is negative counts as large."""
     return np.maximum.reduceat(np.concatenate(indices).view(np.uint32), starts_of(indices))
 
@@ -103,7 +105,7 @@ def _polygons(mesh: Told, normals: Primvar | None) -> Polygons:
         mesh.counts,
         mesh.indices,
         mesh.faces,
-        _NO_HOLES,
+        mesh.holes,
         mesh.scheme,
         mesh.left_handed,
         normals,

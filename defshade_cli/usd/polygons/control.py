@@ -101,7 +101,7 @@ def _plain_topology(polygons: Polygons) -> Topology:
             face_indices=polygons.indices,
             vertex_count=len(polygons.points),
             scheme=cast("SchemeName", polygons.scheme),
-            holes=np.flatnonzero(np.isin(polygons.faces, polygons.holes)),
+            holes=np.flatnonzero(polygons.is_hole),
         )
     return known
 
@@ -117,7 +117,7 @@ def _read_topology(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode) -
         scheme=cast("SchemeName", polygons.scheme),
         interpolate_boundary=cast("BoundaryRule", mesh.GetInterpolateBoundaryAttr().Get(time)),
         triangle_subdivision_rule=cast("TriangleRule", mesh.GetTriangleSubdivisionRuleAttr().Get(time)),
-        holes=np.flatnonzero(np.isin(polygons.faces, polygons.holes)),
+        holes=np.flatnonzero(polygons.is_hole),
         crease_indices=_indices(mesh.GetCreaseIndicesAttr(), time),
         crease_lengths=_indices(mesh.GetCreaseLengthsAttr(), time),
         crease_sharpnesses=_sharpnesses(mesh.GetCreaseSharpnessesAttr(), time),

@@ -63,6 +63,12 @@ class Row(NamedTuple):
         """(M + 1,) where each mesh's values of a primvar begin, which is no constant."""
         return {"uniform": self.faces, "faceVarying": self.corners}.get(interpolation, self.points)
 
+    def select(self, kept: NDArray[np.bool_]) -> Row:
+        """The faces for which `kept` (F,) holds; the points all stay."""
+        corners = kept[self.polygons.face_of_corner]
+        faces_left, corners_left = (np.append(0, np.cumsum(each)) for each in (kept, corners))
+        return Row(self.polygons.select(kept), self.points, faces_left[self.faces], corners_left[self.corners])
+
 
 def signature(mesh: Polygons) -> Hashable:
     """Meshes for which it is the same may stand in one row; what lies on one lies on all."""

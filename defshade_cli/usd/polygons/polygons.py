@@ -96,6 +96,20 @@ class Polygons:
         """(C,) the face that each corner is part of."""
         return np.repeat(np.arange(len(self.counts), dtype=np.int32), self.counts)
 
+    @cached_property
+    def is_hole(self) -> NDArray[np.bool_]:
+        """(F,) the faces that shape the surface and are not drawn."""
+        if not len(self.holes):
+            return np.zeros(len(self.faces), bool)
+        marked = np.zeros(max(self.faces.max(initial=0), self.holes.max()) + 1, bool)
+        marked[self.holes] = True
+        return marked[self.faces]
+
+    @property
+    def drawn_faces(self) -> NDArray[np.int32]:
+        """The authored faces that those are part of which are drawn."""
+        return self.faces[~self.is_hole] if len(self.holes) else self.faces
+
     def by_size(self) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         """Blocks of B faces that all have n corners: the faces (B,), and their corners (B, n)."""
         if not len(self.counts):
@@ -167,7 +181,7 @@ class Polygons:
         """Equal for polygons of one scheme that join as many points alike, and have the same holes."""
         arrays = [self.counts, self.indices]
         if len(self.holes):
-            arrays.append(np.flatnonzero(np.isin(self.faces, self.holes)))
+            arrays.append(np.flatnonzero(self.is_hole))
         said = self.scheme, len(self.points), *[array.dtype.char for array in arrays]
         if len(self.indices) <= _FEW_CORNERS:
             return said, *[array.tobytes() for array in arrays]
@@ -192,7 +206,7 @@ class Polygons:
 
     def without_holes(self) -> Polygons:
         """Without the faces that are holes."""
-        return self.select(~np.isin(self.faces, self.holes)) if len(self.holes) else self
+        return self.select(~self.is_hole) if len(self.holes) else self
 
     def joined(self) -> Polygons:
         """The same with every primvar joined."""

@@ -23,6 +23,7 @@ Elements = Mapping[str, int]
 
 _UV_WIDTHS = {Sdf.ValueTypeNames.Find(f"texCoord{width}{kind}"): width for width in (2, 3) for kind in "fdh"}
 _UV_WIDTHS |= {Sdf.ValueTypeNames.Find(name): 2 for name in ("float2", "double2", "half2")}
+_UV_WIDTHS |= {scalar.arrayType: width for scalar, width in _UV_WIDTHS.items()}
 """Numbers a value of what may be texture coordinates. Of three the first two count."""
 
 
@@ -81,9 +82,9 @@ def find_primvars(prim: Usd.Prim) -> dict[str, UsdGeom.Primvar]:
     return {str(p.GetPrimvarName()): p for p in UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance()}
 
 
-def may_be_uvs(primvar: UsdGeom.Primvar) -> bool:
-    """Does it have a type that texture coordinates have?"""
-    return primvar.GetTypeName().scalarType in _UV_WIDTHS
+def uv_width(attribute: UsdGeom.Primvar | Usd.Attribute) -> int:
+    """Numbers a value of what has a type that texture coordinates have; 0 of anything else."""
+    return _UV_WIDTHS.get(attribute.GetTypeName(), 0)
 
 
 def read_carried(
@@ -95,12 +96,13 @@ def read_carried(
         return NOTHING_CARRIED
     colors = _fit_finite(authored(found.get(color), time), 3, elements, issues)
     opacity = _fit_finite(authored(found.get("displayOpacity"), time), 1, elements, issues)
-    uvs = {n: _read_uvs(p, time, elements, issues) for n, p in found.items() if may_be_uvs(p)}
+    uvs = {n: _read_uvs(p, w, time, elements, issues) for n, p in found.items() if (w := uv_width(p))}
     return Carried(colors, opacity, {name: primvar for name, primvar in uvs.items() if primvar is not None})
 
 
-def _read_uvs(primvar: UsdGeom.Primvar, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> Primvar | None:
-    width = _UV_WIDTHS[primvar.GetTypeName().scalarType]
+def _read_uvs(
+    primvar: UsdGeom.Primvar, width: int, time: Usd.TimeCode, elements: Elements, issues: list[str]
+) -> Primvar | None:
     uvs = _fit_finite(authored(primvar, time), width, elements, issues)
     return uvs if uvs is None or width == 2 else replace(uvs, values=uvs.values[:, :2])
 

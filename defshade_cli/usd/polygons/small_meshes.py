@@ -41,7 +41,7 @@ def shape_all(meshes: Iterable[Polygons]) -> dict[Polygons, Shaped]:
 
 
 def _small(meshes: Iterable[Polygons]) -> Iterable[Polygons]:
-    few = [mesh for mesh in meshes if 0 < len(mesh.indices) <= LARGEST and not len(mesh.holes)]
+    few = [m for m in meshes if 0 < len(m.indices) <= LARGEST and len(m.holes) < len(m.counts)]
     if not few:
         return ()
     counts = [mesh.counts for mesh in few]
@@ -51,7 +51,7 @@ def _small(meshes: Iterable[Polygons]) -> Iterable[Polygons]:
 
 def _joined(meshes: Sequence[Polygons]) -> Iterator[tuple[Sequence[Polygons], Row]]:
     """Meshes of one signature, by which of their face-varying primvars lie on points, where these do."""
-    row = lay(meshes)
+    row = _drawn(meshes)
     lying = {primvar: _on_points(primvar, row) for primvar in row.polygons.primvars if _is_at_corners(primvar)}
     if not lying:
         yield meshes, row
@@ -59,8 +59,17 @@ def _joined(meshes: Sequence[Polygons]) -> Iterator[tuple[Sequence[Polygons], Ro
     kinds, kind = np.unique([agrees for _, agrees in lying.values()], axis=1, return_inverse=True)
     for number, agreeing in enumerate(kinds.T):
         chosen = meshes if len(kinds.T) == 1 else list(compress(meshes, (kind == number).tolist()))
-        whole = row if len(kinds.T) == 1 else lay(chosen)
+        whole = row if len(kinds.T) == 1 else _drawn(chosen)
         yield chosen, whole._replace(polygons=_with_joined(whole, agreeing))
+
+
+def _drawn(meshes: Sequence[Polygons]) -> Row:
+    """With normals, and without holes, which have part in these."""
+    row = lay(meshes)
+    row = row._replace(polygons=with_normals(row.polygons))
+    if not any(len(mesh.holes) for mesh in meshes):
+        return row
+    return row.select(~np.concatenate([mesh.is_hole for mesh in meshes]))
 
 
 def _with_joined(row: Row, agreeing: NDArray[np.bool_]) -> Polygons:
@@ -85,8 +94,8 @@ def _on_points(primvar: Primvar, row: Row) -> tuple[Primvar, NDArray[np.bool_]]:
 
 
 def _shape(row: Row) -> Iterator[Vertices]:
-    """Of each mesh of the row."""
-    whole = with_normals(row.polygons)
+    """Of each mesh of the row, which has normals."""
+    whole = row.polygons
     cut, face = triangulate(whole, [])
     ends = np.searchsorted(face, row.faces)
     drawn = vertices_of(whole, (cut, face))

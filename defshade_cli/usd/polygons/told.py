@@ -6,40 +6,31 @@ them but what is so common that it pays. All others are for usd/polygons/mesh.py
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any, Literal, NamedTuple
+from collections.abc import Mapping
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom, Vt
 
-from defshade_cli.usd.color_space import in_rec709
+from defshade_cli.usd.color_space import in_rec709, is_color
 from defshade_cli.usd.polygons.end_to_end import LARGEST
 from defshade_cli.usd.polygons.mesh import sizes_of
 from defshade_cli.usd.polygons.polygons import SCHEMES, Interpolation, Primvar, Scheme
-from defshade_cli.usd.polygons.primvars import find_primvars
-from defshade_cli.usd.said import Said
+from defshade_cli.usd.polygons.primvars import uv_width
+from defshade_cli.usd.said import NOTHING_INHERITED, Inherited, Said
+from defshade_cli.usd.values import are_finite, floats, integers
 
 _PRIMVARS, _INDICES = "primvars:", ":indices"
-_RARE = frozenset({"velocities", "holeIndices", "primvars:normals:indices"})
+_CONSTANT: Interpolation = "constant"
+_VERTEX: Interpolation = "vertex"
+_RARE = frozenset({"velocities", "primvars:normals:indices"})
 _TYPES = Sdf.ValueTypeNames
-_UVS = frozenset({_TYPES.TexCoord2fArray, _TYPES.Float2Array})
 _NORMALS = frozenset({_TYPES.Normal3fArray, _TYPES.Float3Array, _TYPES.Vector3fArray})
-_COLORS = frozenset({_TYPES.Color3fArray, _TYPES.Color4fArray})
-_COMMON = (
-    _UVS
-    | _COLORS
-    | frozenset(
-        {_TYPES.IntArray, _TYPES.Float3Array, _TYPES.FloatArray, _TYPES.Normal3fArray}
-        | {_TYPES.Float4Array, _TYPES.StringArray, _TYPES.TokenArray, _TYPES.String, _TYPES.Token}
-        | {_TYPES.Float, _TYPES.Int, _TYPES.Bool, _TYPES.Matrix4d, _TYPES.Vector3fArray, _TYPES.Point3fArray}
-    )
-)
-"""Of primvars; all but the first two are no texture coordinates."""
+_NO_HOLES = np.empty(0, np.int32)
 
 
-_DISPLAY_OPACITY = "primvars:displayOpacity"
-_NO_INDICES = Vt.IntArray()
+Field = Literal["normals", "display_color", "display_opacity", "uvs"]
 
 
 class Lying(NamedTuple):
@@ -48,7 +39,7 @@ class Lying(NamedTuple):
     field: of Polygons.  name: of texture coordinates.
     """
 
-    field: Literal["normals", "display_color", "display_opacity", "uvs"]
+    field: Field
     name: str
     values: NDArray[np.float32]
     interpolation: Interpolation
@@ -61,12 +52,13 @@ class Lying(NamedTuple):
 
 
 class Told(NamedTuple):
-    """Of a mesh what the fields of Polygons of these names hold, unless it is not sound. None of it is empty."""
+    """Of a mesh what the fields of Polygons of these names hold, unless it is not sound. Only holes may be empty."""
 
     points: NDArray[np.float32]
     counts: NDArray[np.integer]
     indices: NDArray[np.int32]
     faces: NDArray[np.int32]
+    holes: NDArray[np.integer]
     scheme: Scheme
     left_handed: bool
     normals: Lying | None
@@ -96,74 +88,112 @@ def told_of(prim: Usd.Prim, said: Said, time: Usd.TimeCode, color: str) -> Told 
     carried = _carried(prim, said, time, color) if said.primvars else ()
     if normals is _MORE or carried is None:
         return None
-    left_handed = "orientation" in names and prim.GetAttribute("orientation").Get() == UsdGeom.Tokens.leftHanded
     return Told(
-        np.asarray(points), sizes.counts, np.asarray(indices), sizes.faces, scheme, left_handed, normals, carried
+        np.asarray(points),
+        sizes.counts,
+        np.asarray(indices),
+        sizes.faces,
+        _holes(prim, time) if "holeIndices" in names else _NO_HOLES,
+        scheme,
+        "orientation" in names and prim.GetAttribute("orientation").Get() == UsdGeom.Tokens.leftHanded,
+        normals,
+        carried,
     )
+
+
+def _holes(prim: Usd.Prim, time: Usd.TimeCode) -> NDArray[np.integer]:
+    holes = integers(prim.GetAttribute("holeIndices").Get(time))
+    return _NO_HOLES if holes is None else holes
 
 
 def _normals(prim: Usd.Prim, said: Said, time: Usd.TimeCode) -> Lying | None:
     """Those that count, None without any; _MORE where they are no vectors, or the same everywhere."""
     if "primvars:normals" in said.names:
-        attribute, fallback = prim.GetAttribute("primvars:normals"), UsdGeom.Tokens.constant
+        attribute, fallback = prim.GetAttribute("primvars:normals"), _CONSTANT
         if attribute.GetTypeName() not in _NORMALS:
             return _MORE
     elif "normals" in said.names:
-        attribute, fallback = prim.GetAttribute("normals"), UsdGeom.Tokens.vertex
+        attribute, fallback = prim.GetAttribute("normals"), _VERTEX
     else:
         return None
     value, interpolation = attribute.Get(time), attribute.GetMetadata("interpolation") or fallback
-    if not isinstance(value, Vt.Vec3fArray) or not value or interpolation == UsdGeom.Tokens.constant:
+    if not isinstance(value, Vt.Vec3fArray) or not value or interpolation == _CONSTANT:
         return _MORE
     return Lying("normals", "", np.asarray(value), interpolation)
 
 
 def _carried(prim: Usd.Prim, said: Said, time: Usd.TimeCode, color: str) -> tuple[Lying, ...] | None:
     """Colour, opacity and texture coordinates, its own or inherited; None where there is more to them."""
-    found = []
-    for name, attribute in _lying(prim, said):
-        value = attribute.Get(time) if attribute else None
-        is_display = name in (_PRIMVARS + color, _DISPLAY_OPACITY)
-        type_name = None if isinstance(value, Vt.Vec2fArray) else attribute and attribute.GetTypeName()
-        if type_name is None and is_display:
+    handed_down = _inherited(said.inherited, time, color)
+    if handed_down is None:
+        return None
+    found = {**handed_down}
+    for name in said.lying:
+        indices = prim.GetAttribute(name + _INDICES) if name + _INDICES in said.names else None
+        short = name[len(_PRIMVARS) :]
+        lying = _lying(short, prim.GetAttribute(name), indices, time, color)
+        if lying is _MORE or (lying is None and short in found):
             return None
-        if type_name is not None and type_name not in _COMMON:
-            return None
-        field, expected = _read_as(name[len(_PRIMVARS) :], type_name, color)
-        if not expected:
-            continue
-        indices = _indices(attribute, name, prim, said, time)
-        if not isinstance(value, expected) or not value or not isinstance(indices, Vt.IntArray):
-            return None
-        colors = in_rec709(attribute, value) if type_name in _COLORS else value
-        interpolation = UsdGeom.Primvar(attribute).GetInterpolation()
-        chosen = None if indices is _NO_INDICES else np.asarray(indices)
-        found.append(Lying(field, name[len(_PRIMVARS) :], np.asarray(colors), interpolation, chosen))
-    return tuple(found)
+        found[short] = lying
+    return tuple([lying for lying in found.values() if lying])
 
 
-def _lying(prim: Usd.Prim, said: Said) -> Iterable[tuple[str, Usd.Attribute]]:
-    """Primvars by the names of their attributes, in the order of read_carried."""
-    if not said.inherits:
-        return [(name, prim.GetAttribute(name)) for name in said.lying]
-    found = ((str(primvar.GetName()), primvar.GetAttr()) for primvar in find_primvars(prim).values())
-    return [(name, attribute) for name, attribute in found if name != "primvars:normals"]
+_Found = Mapping[str, Lying | None]
+_NOTHING_FOUND: _Found = {}
 
 
-def _indices(attribute: Usd.Attribute, name: str, prim: Usd.Prim, said: Said, time: Usd.TimeCode) -> Any:
-    if not said.inherits:
-        return prim.GetAttribute(name + _INDICES).Get(time) if name + _INDICES in said.names else _NO_INDICES
-    primvar = UsdGeom.Primvar(attribute)
-    return primvar.GetIndices(time) if primvar.IsIndexed() else _NO_INDICES
+def _inherited(inherited: Inherited, time: Usd.TimeCode, color: str) -> _Found | None:
+    """The same of what ancestors hand down, by name; made once for all that is below them."""
+    if inherited is NOTHING_INHERITED:
+        return _NOTHING_FOUND
+    key = time, color
+    if key not in inherited.read:
+        named = {str(primvar.GetPrimvarName()): primvar for primvar in inherited.primvars}
+        named.pop("normals", None)
+        attributes = [(name, p.GetAttr(), p.GetIndicesAttr() if p.IsIndexed() else None) for name, p in named.items()]
+        found = {name: _lying(name, values, indices, time, color) for name, values, indices in attributes}
+        inherited.read[key] = None if any(each is _MORE for each in found.values()) else found
+    known: _Found | None = inherited.read[key]
+    return known
 
 
-def _read_as(name: str, type_name: Sdf.ValueTypeName | None, color: str) -> tuple[Any, type | None]:
-    """The field that a primvar fills, and what its values should be; None of one that is not read.
-
-    type_name: None of pairs of floats, which are texture coordinates whatever they are called.
-    """
-    if type_name is None or type_name in _UVS:
-        return "uvs", Vt.Vec2fArray
+def _lying(
+    name: str, attribute: Usd.Attribute, indices: Usd.Attribute | None, time: Usd.TimeCode, color: str
+) -> Lying | None:
+    """A primvar as that for which it counts; None of one that is not read, _MORE where there is more to it."""
+    value = attribute.Get(time) if attribute else None
     if name == color:
-        return "display_color", Vt.Vec3fArray
-    return "display_opacity", Vt.FloatArray if name == "displayOpacity" else None
+        return _lying_color(name, attribute, value, indices, time)
+    if name == "displayOpacity":
+        return _laid("display_opacity", name, attribute, floats(value, 1), indices, time)
+    width = 2 if isinstance(value, Vt.Vec2fArray) else attribute and uv_width(attribute)
+    if not width:
+        return None
+    values = floats(value, width)
+    if values is not None and width == 3:
+        values = values[:, :2] if are_finite(values) else None
+    return _laid("uvs", name, attribute, values, indices, time)
+
+
+def _lying_color(
+    name: str, attribute: Usd.Attribute, value: object, indices: Usd.Attribute | None, time: Usd.TimeCode
+) -> Lying:
+    if not attribute or uv_width(attribute):
+        return _MORE
+    colors = in_rec709(attribute, value) if is_color(attribute) else value
+    return _laid("display_color", name, attribute, floats(colors, 3), indices, time)
+
+
+def _laid(
+    field: Field,
+    name: str,
+    attribute: Usd.Attribute,
+    values: NDArray[np.float32] | None,
+    indices: Usd.Attribute | None,
+    time: Usd.TimeCode,
+) -> Lying:
+    chosen = None if indices is None else indices.Get(time)
+    if values is None or not len(values) or not (indices is None or isinstance(chosen, Vt.IntArray)):
+        return _MORE
+    interpolation = attribute.GetMetadata("interpolation") or _CONSTANT
+    return Lying(field, name, values, interpolation, None if chosen is None else np.asarray(chosen))

@@ -33,8 +33,8 @@ from defshade_cli.usd.polygons.primvars import (
     Elements,
     count_elements,
     find_primvars,
-    may_be_uvs,
     read_shown,
+    uv_width,
 )
 from defshade_cli.usd.polygons.shapes import Shapes
 from defshade_cli.usd.polygons.small_meshes import Shaped
@@ -152,7 +152,7 @@ def surface_of(
         polygons=polygons,
         control=control,
         faces=faces,
-        groups=faces.groups_of(polygons.without_holes().faces) if copies is None or len(copies.ids) else (),
+        groups=faces.groups_of(polygons.drawn_faces) if copies is None or len(copies.ids) else (),
         double_sided=_is_double_sided(prim, said),
         copies=copies,
         display_color=display_color,
@@ -241,7 +241,7 @@ def _carried(prim: Usd.Prim, color: str, shown: tuple[str, ...]) -> Iterator[Usd
     yield from (api.GetPrimvar(name) for name in ("normals", "widths"))
     yield from (api.FindPrimvarWithInheritance(name) for name in shown)
     found = find_primvars(prim).items()
-    yield from (p for name, p in found if name in (color, "displayOpacity") or may_be_uvs(p))
+    yield from (p for name, p in found if name in (color, "displayOpacity") or uv_width(p))
 
 
 def _read_shape(
