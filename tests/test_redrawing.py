@@ -12,7 +12,7 @@ import pytest
 
 from build import scene, sun
 from defshade_cli.image.film import Film
-from defshade_cli.passes.last_frame import LastFrame
+from defshade_cli.passes.screen import Narrowing
 from defshade_cli.plan import make_plan, plan_after
 from defshade_cli.rendering import Renderer, run
 from defshade_cli.settings import RenderJob, RenderSettings
@@ -174,13 +174,13 @@ def test_a_part_is_drawn_and_the_picture_is_equal(
 def test_shadows_that_stay_are_not_drawn_again(
     tmp_path: Path, renderer: Renderer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    drawn_tiles: list[Any] = []
-    keep = LastFrame.keep
-    monkeypatch.setattr(LastFrame, "keep", lambda *told: (drawn_tiles.append(told[2]), keep(*told)))
+    parts: list[Any] = []
+    of = Narrowing.of
+    monkeypatch.setattr(Narrowing, "of", lambda *told: (parts.append(told[1]), of(*told))[1])
     job = job_of(SUN + BULB + FLOOR + BALL, tmp_path, (1.0, 2.0, 3.0), {"shadows": True, "motion_blur": False})
     drawn(job, renderer)
-    assert drawn_tiles[0] is None
-    assert all(0.1 < tiles.mean() < 0.6 for tiles in drawn_tiles[1:])
+    assert parts[0] is None
+    assert all(part.seen is not None and part.tiles.mean() < 0.5 for part in parts[1:])
 
 
 @pytest.mark.parametrize(

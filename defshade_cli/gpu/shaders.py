@@ -146,6 +146,13 @@ def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> Non
             program[name] = value
 
 
+def set_uniform_bytes(program: moderngl.Program, name: str, values: bytes) -> None:
+    """An array, as GLSL lays it out."""
+    uniform = program[name]
+    assert isinstance(uniform, moderngl.Uniform)
+    uniform.write(values)
+
+
 def _readable(message: str, sources: list[Source]) -> str:
     """moderngl heads its message with the stage that failed; that stage's source names the lines."""
     stages = {_STAGES.get(source.name.rpartition(".")[2], ""): source for source in sources}

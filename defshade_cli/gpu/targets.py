@@ -26,6 +26,9 @@ Part = tuple[float, float, float, float]
 """Of an image: left, top, right and bottom as shares of it."""
 
 
+NOWHERE: Part = (0.0, 0.0, 0.0, 0.0)
+
+
 def pixels_of(part: Part, size: tuple[int, int]) -> tuple[int, int, int, int]:
     """(x, y, width, height) of all pixels that a part of an image of (width, height) touches."""
     left, top, right, bottom = (share * side for share, side in zip(part, size * 2, strict=True))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.gpu.targets import pixels_of
+from defshade_cli.gpu.targets import NOWHERE, Part, pixels_of
 from defshade_cli.passes.light_lists import TILE, tile_grid
-from defshade_cli.passes.screen import regions_of
+from defshade_cli.passes.screen import Drawn, regions_of
 from defshade_cli.plan import Plan
 from defshade_cli.scene.geometry import box_corners
 from defshade_cli.spaces import transform_points
@@ -34,18 +34,28 @@ def worthwhile(tiles: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
     return tiles if tiles.mean() < _WORTHWHILE else None
 
 
-def beside(before: Layers, layers: Layers, tiles: NDArray[np.bool_]) -> Layers:
-    """Layers (H, W, C) as drawn in some tiles (R, C), and as they were before in the others."""
-    return {name: _joined(before[name], drawn, tiles) for name, drawn in layers.items()}
+def beside(before: Layers, layers: Layers, drawn: Drawn) -> Layers:
+    """Layers (H, W, C) as drawn in some tiles, and as they were before in the others."""
+    return {name: _joined(before[name], values, drawn) for name, values in layers.items()}
 
 
-def _joined(before: NDArray[np.float32], drawn: NDArray[np.float32], tiles: NDArray[np.bool_]) -> NDArray[np.float32]:
-    height, width = drawn.shape[:2]
+def _joined(before: NDArray[np.float32], values: NDArray[np.float32], drawn: Drawn) -> NDArray[np.float32]:
+    height, width = values.shape[:2]
     joined = before.copy()
-    for left, top, right, bottom in regions_of(tiles, TILE, (width, height)):
+    for left, top, right, bottom in regions_of(drawn.tiles, drawn.side, (width, height)):
         x, y, across, down = pixels_of((left, top, right, bottom), (width, height))
-        joined[y : y + down, x : x + across] = drawn[y : y + down, x : x + across]
+        joined[y : y + down, x : x + across] = values[y : y + down, x : x + across]
     return joined
+
+
+def part_around(tiles: NDArray[np.bool_], size: tuple[int, int]) -> Part:
+    """Of an image of (width, height), around those of its tiles (R, C); nothing around none."""
+    rows, columns = np.nonzero(tiles)
+    if not len(rows):
+        return NOWHERE
+    corners = np.array([columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]) * TILE / np.array(size * 2)
+    left, top, right, bottom = np.minimum(corners, 1.0).tolist()
+    return left, top, right, bottom
 
 
 def _rectangles(boxes: NDArray[np.float64], plan: Plan) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import moderngl
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 
 _BAND = 2**19
 """Pixels shown at a time."""
+
+_PIECE = 64
+"""Pixels in a row, that are shown again where one of them changes; less in images whose width is no multiple of it."""
 
 _MIDDLE = 0.5
 """A depth between those that the table's shader writes: 0 where the transform itself is wanted, else 1."""
@@ -45,16 +49,18 @@ class DisplayPass:
     ) -> NDArray[np.float32] | NDArray[np.uint8]:
         """(H, W, 3 or 4), premultiplied → the same shape in [0, 1], or of bytes, rounded.
 
-        straight: colours come out without their alpha.  of: whose picture it is: rows that are as they were when it was
-        last shown are not worked out again. Raises GpuError.
+        straight: colours come out without their alpha.  of: whose picture it is: pieces of rows that are as they were
+        when it was last shown are not worked out again. Raises GpuError.
         """
         before = self._last.get((of, straight, in_bytes))
         if before is None or before[0].shape != pixels.shape:
             shown = self._draw(pixels, straight, in_bytes)
         else:
-            changed, shown = (pixels != before[0]).any(axis=(1, 2)), before[1].copy()
+            pieces, shown = _in_pieces(pixels), before[1].copy()
+            changed = (pieces != _in_pieces(before[0])).any(axis=(2, 3))
             if changed.any():
-                shown[changed] = self._draw(pixels[changed], straight, in_bytes)
+                drawn = self._draw(_in_rows(pieces[changed], pieces.shape[1]), straight, in_bytes)
+                _in_pieces(shown)[changed] = drawn.reshape(-1, *pieces.shape[2:])[: changed.sum()]
         self._last[of, straight, in_bytes] = pixels, shown
         return shown
 
@@ -80,6 +86,20 @@ class DisplayPass:
         for texture in filter(None, (image, depth)):
             texture.release()
         return shown
+
+
+def _in_pieces(pixels: NDArray[Any]) -> NDArray[Any]:
+    """(H, N, W / N, C) of (H, W, C): a view."""
+    height, width, channels = pixels.shape
+    count = width // math.gcd(width, _PIECE)
+    return pixels.reshape(height, count, -1, channels)
+
+
+def _in_rows(pieces: NDArray[Any], count: int) -> NDArray[Any]:
+    """(H, W, C) of pieces (K, P, C), so many in a row; the last row is filled with zeros."""
+    rows = np.zeros((-(-len(pieces) // count) * count, *pieces.shape[1:]), pieces.dtype)
+    rows[: len(pieces)] = pieces
+    return rows.reshape(-1, count * pieces.shape[1], pieces.shape[2])
 
 
 class _Shader:

@@ -13,7 +13,7 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import Plane, integer_attachments, uses_standard_depth, write_source
 from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.residence import DrawList
-from defshade_cli.gpu.targets import Part, Target, allocate
+from defshade_cli.gpu.targets import NOWHERE, Part, Target, allocate
 from defshade_cli.gpu.textures import textures_source
 from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.culling import CommandBuffer, clip_of_part, may_see
@@ -113,11 +113,14 @@ class GBufferPass:
         Both sides of every face.
 
         Under the mask the depth is the background's afterwards, and the planes are as they were unless `whole`.
+        Around the part that a mask keeps to, all is as it was.
         """
         standard = uses_standard_depth(gbuffer.layout)
         nearest, background = (0.0, 1.0) if standard else (1.0, 0.0)
         part = WHOLE_IMAGE if whole else mask.open
-        self._clear(gbuffer, background, part)
+        if part == NOWHERE:
+            return
+        self._clear(gbuffer, background, part, around=not mask.keeps)
         if not whole:
             mask.shut(gbuffer.target, nearest)
         gbuffer.target.framebuffer.use()
@@ -135,13 +138,15 @@ class GBufferPass:
         mask.empty(gbuffer.target, background)
         gbuffer.target.keep_to(WHOLE_IMAGE)
 
-    def _clear(self, gbuffer: GBuffer, background: float, part: Part) -> None:
-        """All depths and numbers, and the planes of a part of the image, to which draws keep from now on."""
+    def _clear(self, gbuffer: GBuffer, background: float, part: Part, *, around: bool) -> None:
+        """The planes of a part of the image, to which draws keep from now on; depths and numbers `around` it too."""
         target = gbuffer.target
-        if part != WHOLE_IMAGE:
+        if part != WHOLE_IMAGE and around:
             with target.colours_kept():
                 target.framebuffer.clear(depth=background)
         target.framebuffer.use()
+        if not around:
+            target.keep_to(part)
         for attachment in integer_attachments(gbuffer.planes, gbuffer.layout):
             self._gpu.clear_integers(attachment)
         target.keep_to(part)

@@ -25,7 +25,7 @@ from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.light_traits import Traits, common_traits, lights_source
 from defshade_cli.passes.lighting import LightingVariant
 from defshade_cli.passes.sampling import Sample
-from defshade_cli.passes.screen import Screen, regions_of
+from defshade_cli.passes.screen import Drawn, Screen, regions_of
 from defshade_cli.passes.shadow_atlas import ShadowAtlas, kind_of
 from defshade_cli.passes.tables import NO_TABLES, LightTables
 from defshade_cli.passes.tile_depths import TileDepths, boxes_at
@@ -36,6 +36,9 @@ from defshade_cli.spaces import inverse_rigid
 
 _MOST_LIGHTS = 256
 """A draw."""
+
+_NOTHING = np.array([1.0, -1.0])
+"""Nearest and farthest depth of a tile that shows nothing."""
 
 
 class LightTiles:
@@ -50,10 +53,12 @@ class LightTiles:
         self._screen = Screen(gpu)
         self._array = cache(lambda variant, common: self._screen.array(_compile(gpu, variant, common, self._most)))
 
-    def begin(self, gbuffer: GBuffer, plan: Plan, sample: Sample) -> None:
-        """What the tiles show, by the GBuffer of a sample."""
+    def begin(self, gbuffer: GBuffer, plan: Plan, sample: Sample, drawn: Drawn | None = None) -> None:
+        """What the tiles show, by the GBuffer of a sample; of those that are drawn."""
         self._plan, depths = plan, self._depths.read(gbuffer, plan)
         self._runs = self._frame.tile_runs(depths.shape[1::-1])
+        if drawn:
+            depths = np.where(_are_drawn(drawn, depths.shape[:2])[..., None], depths, _NOTHING)
         self._boxes = boxes_at(depths, plan, sample)
         self._camera_from_relative = inverse_rigid(placement(plan.camera, sample))
 
@@ -101,6 +106,14 @@ def _compile(gpu: Gpu, variant: LightingVariant, common: Traits, most: int) -> m
     generated = {**variant.generated, "generated/lights.glsl": lights_source(most, common)}
     defines = [*variant.defines, *variant.distances, f"LIGHT_TILE {TILE}"]
     return gpu.shaders.program("screen.vert", "lighting_tiles.frag", defines=defines, generated=generated)
+
+
+def _are_drawn(drawn: Drawn, grid: tuple[int, ...]) -> NDArray[np.bool_]:
+    """(rows, columns) of tiles, by some as large or smaller ones."""
+    times, parts = TILE // drawn.side, drawn.tiles
+    padded = np.zeros((grid[0] * times, grid[1] * times), bool)
+    padded[: parts.shape[0], : parts.shape[1]] = parts
+    return np.asarray(padded.reshape(grid[0], times, grid[1], times).any(axis=(1, 3)))
 
 
 def light_bounds(records: NDArray[Any], camera_from_relative: NDArray[np.float64]) -> LightBounds:

@@ -15,7 +15,8 @@ from defshade_cli.gpu.planes import MOST_TARGETS, Plane
 from defshade_cli.gpu.residence import LIGHTS, MOTIONS, VIEW_BLOCK, DrawList, GpuScene, RecordBuffer
 from defshade_cli.image.film import Film, Sampling
 from defshade_cli.passes.accumulation import AccumulationPass
-from defshade_cli.passes.changed_tiles import beside, changed_tiles, worthwhile
+from defshade_cli.passes.changed_parts import PART, parts_of
+from defshade_cli.passes.changed_tiles import beside, changed_tiles, part_around, worthwhile
 from defshade_cli.passes.debug_volumes import DebugVolumesPass, laid_over
 from defshade_cli.passes.emission import EmissionPass
 from defshade_cli.passes.emitters import light_batches, middle_of, shadow_extent
@@ -23,7 +24,7 @@ from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
 from defshade_cli.passes.identification import Manifests, Mattes, id_manifests
-from defshade_cli.passes.last_frame import LastFrame, Tiles
+from defshade_cli.passes.last_frame import LastFrame
 from defshade_cli.passes.light_lists import TILE
 from defshade_cli.passes.light_records import light_records
 from defshade_cli.passes.light_targets import LightTargets
@@ -34,7 +35,7 @@ from defshade_cli.passes.linking import ALL_LINKED
 from defshade_cli.passes.lobe_rays import LampRaysPass, LampStore, LobeRays, SkyRaysPass, TreeStore, sky_densities
 from defshade_cli.passes.readback import Planes, data_layers, read_planes
 from defshade_cli.passes.sampling import CENTRE, Sample, samples
-from defshade_cli.passes.screen import Narrowing, Screen, TileMask
+from defshade_cli.passes.screen import Drawn, Narrowing, Screen, TileMask
 from defshade_cli.passes.shadow_atlas import ShadowAtlas
 from defshade_cli.passes.shadow_maps import MapRequest
 from defshade_cli.passes.shadows import ShadowPass, ShadowVariant
@@ -53,10 +54,18 @@ Layers = dict[str, NDArray[np.float32]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class _Known:
+    """drawn: what of the image is, None for all of it.  maps: of each batch of lights, those that are drawn already."""
+
+    drawn: Drawn | None
+    maps: Sequence[ShadowAtlas]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _Canvas:
     """What the samples of a frame are lit on, what is known of its domes' skies, and what rays along lobes read.
 
-    maps: of each batch of lights, those that are drawn already.
+    known: of the frame before.
     """
 
     gbuffer: GBuffer
@@ -64,7 +73,7 @@ class _Canvas:
     visibility: SkyVisibility | None
     guides: SkyGuides
     rays: LobeRays | None
-    maps: Sequence[ShadowAtlas] = ()
+    known: _Known
 
 
 class Pipeline:
@@ -131,26 +140,23 @@ class Pipeline:
         """
         with self._gpu.watched():
             draws = uploaded or self._resident(scene, plan)
-            tiles, maps = self._changes(draws, scene, plan, before) if before else (None, ())
-            with self._narrowing.of(tiles, TILE, plan.size):
-                film = self._film(draws, scene, plan, moments, maps)
-        if before and tiles is not None:
-            layers = beside(before.layers, film.layers, tiles)
+            part, maps = self._changes(draws, scene, plan, before) if before else (None, ())
+            with self._narrowing.of(part, plan.size):
+                film = self._film(draws, scene, plan, moments, _Known(part, maps))
+        if before and part:
+            layers = beside(before.layers, film.layers, part)
             data = {name: layers[name] for name in plan.data_layers}
             film = replace(film, layers=layers, manifests=film.manifests | id_manifests(data, scene))
-        self._last.keep(film, tiles)
+        self._last.keep(film)
         return film
 
     def _changes(
         self, draws: DrawList, scene: Scene, plan: Plan, before: Film
-    ) -> tuple[Tiles | None, Sequence[ShadowAtlas]]:
-        """The tiles in which something may differ from the frame before, and its shadow maps where those tell it.
-
-        None for all of the image.
-        """
+    ) -> tuple[Drawn | None, Sequence[ShadowAtlas]]:
+        """What may differ from the frame before, and its shadow maps where those tell it; None for all of the image."""
         tiles, boxes = changed_tiles(plan), plan.redrawing.boxes
         if tiles is None or boxes is None or not plan.redrawing.by_maps:
-            return tiles, ()
+            return Drawn(tiles, TILE) if tiles is not None else None, ()
         if not self._last.is_of(before):
             return None, ()
         tables, relative = self._tables.update(plan), boxes - plan.camera.position
@@ -163,8 +169,9 @@ class Pipeline:
             return None, ()
         gbuffer = self._frame.gbuffer(plan.size, plan.planes, plan.layout)
         found = [change.all_behind() if plan.shadow_styles else change for each in changes for change in each]
-        tiles |= self._last.shadowed_tiles(found, gbuffer, plan)
-        return worthwhile(tiles), maps
+        self._view.write(view_record(plan, gbuffer.layout))
+        parts = worthwhile(self._last.shadowed_parts(found, tiles, gbuffer, plan) | parts_of(tiles, plan.size))
+        return Drawn(parts, PART, part_around(tiles, plan.size)) if parts is not None else None, maps
 
     def _film(
         self,
@@ -172,13 +179,13 @@ class Pipeline:
         scene: Scene,
         plan: Plan,
         moments: Iterator[ShutterSample] | None,
-        maps: Sequence[ShadowAtlas],
+        known: _Known,
     ) -> Film:
         layers: Layers = {}
         manifests: Manifests = {}
         sampling = Sampling(1, 1.0, 1)
         if plan.sampled:
-            layers, manifests, sampling = self._sampled_layers(draws, scene, plan, moments, maps)
+            layers, manifests, sampling = self._sampled_layers(draws, scene, plan, moments, known)
         if plan.data_layers:
             draws = self._resident(scene, plan) if plan.moments else draws
             data = data_layers(self._data_planes(draws, plan), plan, scene)
@@ -219,7 +226,7 @@ class Pipeline:
         scene: Scene,
         plan: Plan,
         moments: Iterator[ShutterSample] | None,
-        maps: Sequence[ShadowAtlas],
+        known: _Known,
     ) -> tuple[Layers, Manifests, Sampling]:
         """What is a mean over samples or tells of them, and what ids in it stand for."""
         mattes = Mattes(scene, plan)
@@ -231,7 +238,7 @@ class Pipeline:
         hidden = any(plan.hides_sky(dome) for dome in plan.domes)
         visibility = SkyVisibility.of(self._frame, plan.size) if hidden else None
         tables = self._tables.update(plan)
-        canvas = _Canvas(gbuffer, targets, visibility, guides, self._lobe_rays(scene, plan, guides, tables), maps)
+        canvas = _Canvas(gbuffer, targets, visibility, guides, self._lobe_rays(scene, plan, guides, tables), known)
         self._accumulation.begin(plan.size, plan.samples)
         self._stopping.begin(plan)
         for sample in samples(plan.samples, plan.filter, plan.filter_width, may_stop=plan.tracks_error):
@@ -278,13 +285,13 @@ class Pipeline:
         variant = LightingVariant.of(plan)
         self._emission_pass(variant).draw(gbuffer, targets)
         if plan.lighting == "tiles":
-            self._light_tiles.begin(gbuffer, plan, sample)
+            self._light_tiles.begin(gbuffer, plan, sample, canvas.known.drawn)
         openness = self._sky_visibility_pass(variant) if visibility else None
         if openness and visibility:
             openness.begin_sample(visibility)
         batches = light_batches(scene, plan, sample, canvas.guides) if plan.lit else ()
         for number, batch in enumerate(batches):
-            known = canvas.maps[number] if canvas.maps else None
+            known = canvas.known.maps[number] if canvas.known.maps else None
             request = MapRequest.of(batch, plan, sample, tables, 0 if self._lone else number)
             shadows = self._shadow_maps(draws, plan, request, known) if plan.shadows else None
             lights, emitters = [lit.planned for lit in batch], [lit.emitter for lit in batch]

@@ -10,6 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.targets import Part, Target
 from defshade_cli.scene.window import WHOLE_IMAGE
@@ -32,6 +33,18 @@ def regions_of(tiles: NDArray[np.bool_], side: int, size: tuple[int, int]) -> ND
     last = np.append(np.flatnonzero(starts)[1:], len(row)) - 1
     corners = np.column_stack([first[starts], row[starts], end[starts], row[last[: starts.sum()]] + 1]) * side
     return np.minimum(corners / np.array(size * 2), 1.0).astype(np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawn:
+    """What of an image is drawn: tiles (R, C) of `side` pixels.
+
+    seen: around all in which geometry looks otherwise, for a GBuffer that keeps the rest; None for another.
+    """
+
+    tiles: NDArray[np.bool_]
+    side: int
+    seen: Part | None = None
 
 
 class Screen:
@@ -63,9 +76,11 @@ class TileMask:
 
     Around the others a pixel is drawn too, for passes that read what lies beside theirs.
     open: a part around what is drawn; the whole image where all is done.
+    keeps: nothing is hidden, and around that part stays what is there.
     """
 
     open: Part
+    keeps: bool
 
     def __init__(self, gpu: Gpu) -> None:
         self._context, self._shaders = gpu.context, gpu.shaders
@@ -83,7 +98,7 @@ class TileMask:
         inwards = np.array([1.0, 1.0, -1.0, -1.0]) / np.array(size * 2)
         self._done.cover(done)
         self._apart.cover(done + inwards)
-        self.is_empty = not len(done)
+        self.is_empty, self.keeps = not len(done), False
         around = (rest if len(rest) else WHOLE) - inwards
         (left, top), (right, bottom) = around[:, :2].min(axis=0), around[:, 2:].max(axis=0)
         self.open = (max(left, 0.0), max(top, 0.0), min(right, 1.0), min(bottom, 1.0))
@@ -91,6 +106,11 @@ class TileMask:
     def hide_nothing(self) -> None:
         """All of the image is to be drawn."""
         self.hide(WHOLE[:0], WHOLE, (1, 1))
+
+    def keep_around(self, part: Part) -> None:
+        """Draw in a part of the image."""
+        self.hide_nothing()
+        self.open, self.keeps = part, True
 
     def shut(self, target: Target, depth: float) -> None:
         """Write a depth where nothing is to be drawn, and no colours."""
@@ -137,11 +157,14 @@ class Narrowing:
         self._mask.hide_nothing()
 
     @contextmanager
-    def of(self, tiles: NDArray[np.bool_] | None, side: int, size: tuple[int, int]) -> Iterator[None]:
-        """Some tiles (R, C) within the block; all of the image after it, and where none are given."""
+    def of(self, drawn: Drawn | None, size: tuple[int, int]) -> Iterator[None]:
+        """What is drawn of an image of (width, height) within the block; all after it, and where nothing is given."""
         self.end()
-        if tiles is not None:
-            self.to(tiles, side, size)
+        if drawn and drawn.seen is None:
+            self.to(drawn.tiles, drawn.side, size)
+        elif drawn and drawn.seen is not None:
+            self._screen.cover(regions_of(drawn.tiles, drawn.side, size))
+            self._mask.keep_around(drawn.seen)
         try:
             yield
         finally:

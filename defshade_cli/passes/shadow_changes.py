@@ -6,9 +6,8 @@ behind all that any of them showed or shows, or before all of it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +19,10 @@ from defshade_cli.spaces import Matrix
 Region = tuple[int, int, int, int]
 """Of a map: x, y, width and height in texels."""
 
-_BEFORE, _BEHIND = 2, 1
-"""Texels of a look-up, before the one that is nearest to the middle of its four and behind that: lib/shadow.glsl."""
+_BEFORE, _BEHIND = 3, 2
+"""Texels before the one at a look-up's place and behind it that it may read; one more than it does, for rounding."""
 
-_LEAST_BLOCK, _MOST_BLOCKS = 8, 32
+_LEAST_BLOCK, _MOST_BLOCKS = 8, 64
 _ROUNDING = 2
 """Texels around what is drawn: what float32 and the raster's grid may move a corner, and more."""
 
@@ -49,6 +48,16 @@ class MapChange:
     rows: NDArray[np.int64]
     near: NDArray[np.float64]
     far: NDArray[np.float64]
+
+    def grid(self) -> tuple[NDArray[np.float32], tuple[int, int]]:
+        """(rows, columns, 2) near and far of all blocks around those that changed, and the first one's column and row.
+
+        What did not change has a near that is farther than its far.
+        """
+        first = int(self.columns.min()), int(self.rows.min())
+        blocks = np.full((np.ptp(self.rows) + 1, np.ptp(self.columns) + 1, 2), [-np.inf, np.inf], np.float32)
+        blocks[self.rows - first[1], self.columns - first[0]] = np.column_stack([self.near, self.far])
+        return blocks, first
 
     def all_behind(self) -> MapChange:
         """The same where what casts a shadow says how deep it is."""
@@ -100,12 +109,12 @@ def map_change(
     resolution: int,
 ) -> MapChange | None:
     """By the stored depths (H, W) of what is read of the window; None where nothing changed."""
-    changed = _by_block(old != new, window).max(axis=(2, 3))
+    changed = _by_block((old != new).astype(np.float32), window, np.max) > 0.0
     rows, columns = np.nonzero(changed)
     if not len(rows):
         return None
-    least = _by_block(np.minimum(old, new), window).min(axis=(2, 3))[changed].astype(np.float64)
-    most = _by_block(np.maximum(old, new), window).max(axis=(2, 3))[changed].astype(np.float64)
+    least = _by_block(np.minimum(old, new), window, np.min)[changed].astype(np.float64)
+    most = _by_block(np.maximum(old, new), window, np.max)[changed].astype(np.float64)
     beyond = _BEYOND * (most - least) + _DEPTH * most + _LEAST_DEPTH
     return MapChange(
         places_from_relative,
@@ -118,28 +127,29 @@ def map_change(
     )
 
 
-def _by_block(values: NDArray[Any], window: MapWindow) -> NDArray[Any]:
-    """(rows, columns, side, side) of what look-ups in each block may read; the map's edge goes on beyond it."""
-    pads = [
-        (low - (first * window.block - _BEFORE), (first + count) * window.block + _BEHIND - (low + length))
-        for low, length, first, count in zip(
-            window.read[1::-1], window.read[:1:-1], window.first[::-1], window.count[::-1], strict=True
-        )
-    ]
+def _by_block(
+    values: NDArray[np.float32], window: MapWindow, extreme: Callable[..., NDArray[np.float32]]
+) -> NDArray[np.float32]:
+    """(rows, columns): the extreme of what look-ups in each block may read; the map's edge goes on beyond it."""
     side = window.block + _BEFORE + _BEHIND
-    padded = np.pad(values, pads, mode="edge")
-    return np.lib.stride_tricks.sliding_window_view(padded, (side, side))[:: window.block, :: window.block]
+    for axis in (0, 1):
+        low, length, first = (pair[1 - axis] for pair in (window.read[:2], window.read[2:], window.first))
+        before = low - (first * window.block - _BEFORE)
+        behind = (first + window.count[1 - axis]) * window.block + _BEHIND - (low + length)
+        pads = [(before, behind) if axis == other else (0, 0) for other in (0, 1)]
+        windows = np.lib.stride_tricks.sliding_window_view(np.pad(values, pads, mode="edge"), side, axis=axis)
+        values = extreme(windows[:: window.block] if axis == 0 else windows[:, :: window.block], axis=-1)
+    return values
 
 
-def shadowed(
-    boxes: NDArray[np.float64], changes: Iterable[MapChange], relative_from_boxes: Matrix
+def maps_that_change(
+    boxes: NDArray[np.float64], changes: Sequence[MapChange], relative_from_boxes: Matrix
 ) -> NDArray[np.bool_]:
-    """(N,) may shadows on something in each of the boxes (N, 2, 3) look otherwise?"""
-    found = np.zeros(len(boxes), bool)
-    for change in changes:
-        rest = np.flatnonzero(~found)
+    """(M, N): by which of the changes (M,) may shadows on something in each of the boxes (N, 2, 3) look otherwise?"""
+    found = np.zeros((len(changes), len(boxes)), bool)
+    for met, change in zip(found, changes, strict=True):
         matrix = change.places_from_relative @ relative_from_boxes
-        found[rest[_meet(change, *_rectangles(boxes[rest], matrix, change.resolution))]] = True
+        met[_meet(change, *_rectangles(boxes, matrix, change.resolution))] = True
     return found
 
 

@@ -242,7 +242,8 @@ class Plan:
     def keeps_maps(self) -> bool:
         """Are its shadow maps so few that those of the next frame are drawn where they change?"""
         texels = self.maps_a_sample * self.shadow_resolution**2
-        return self.shadows and self.samples == 1 and texels <= MOST_KEPT * ATLAS**2
+        sees_alike = self.samples == 1 and not self.lobe_rays and self.lighting != "volumes"
+        return self.shadows and sees_alike and texels <= MOST_KEPT * ATLAS**2
 
     @property
     def profiles(self) -> tuple[IesProfile, ...]:
