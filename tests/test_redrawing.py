@@ -142,14 +142,14 @@ def drawn(job: RenderJob, renderer: Renderer) -> tuple[list[Film], list[str]]:
         (GLASS, {"samples": 3, "layers": ("beauty", "diffuse", "light:bulb")}),
         (INSTANCES, {"layers": DATA}),
         (BALL, {"layers": ("motionForward", "motionBackward")}),
-        (BALL, {"shadows": True, "layers": ("beauty", "shadow")}),
-        (HIGHEST, {"shadows": True}),
-        (AROUND + BALL, {"shadows": True}),
+        (BALL, {"shadows": True, "layers": ("beauty", "shadow"), "lighting": "whole"}),
+        (HIGHEST, {"shadows": True, "layers": DATA, "lighting": "whole"}),
+        (AROUND + BALL, {"shadows": True, "lighting": "whole"}),
         (AROUND + BALL, {"shadows": True, "lighting": "tiles"}),
         (AROUND + BALL, {"shadows": True, "lighting": "volumes"}),
-        (FADING.replace("bulb", "fading") + BALL, {"shadows": True}),
-        (GLASS, {"shadows": True}),
-        (PANEL + BALL, {"shadows": True, "light_points": 2}),
+        (FADING.replace("bulb", "fading") + BALL, {"shadows": True, "lighting": "whole"}),
+        (GLASS, {"shadows": True, "lighting": "whole"}),
+        (PANEL + BALL, {"shadows": True, "light_points": 2, "layout": "packed", "lighting": "tiles"}),
         (BALL, {"shadows": True, "samples": 3, "lighting": "volumes"}),
         (GLASS, {"shadows": True, "samples": 2, "lighting": "tiles"}),
     ],
@@ -177,10 +177,10 @@ def test_shadows_that_stay_are_not_drawn_again(
     parts: list[Any] = []
     of = Narrowing.of
     monkeypatch.setattr(Narrowing, "of", lambda *told: (parts.append(told[1]), of(*told))[1])
-    job = job_of(SUN + BULB + FLOOR + BALL, tmp_path, (1.0, 2.0, 3.0), {"shadows": True, "motion_blur": False})
+    job = job_of(SUN + BULB + FLOOR + BALL, tmp_path, (1.0, 2.0, 3.0), {"shadows": True, "lighting": "whole"})
     drawn(job, renderer)
     assert parts[0] is None
-    assert all(part.seen is not None and part.tiles.mean() < 0.5 for part in parts[1:])
+    assert all(part.seen is not None and part.tiles.mean() < 0.4 for part in parts[1:])
 
 
 @pytest.mark.parametrize(
