@@ -1,8 +1,9 @@
 """A display transform as a table, for pictures of 8 bits: where it is within half a step of the transform itself.
 
 The lattice is even in log2(1 + x / TOE) of each scene-linear channel, from 0 to MOST. Between its points the table is
-linear, and each cell knows whether that is near enough at the 27 points that halve it. What lies in a cell that is not,
-or in none, is for the transform. Baking takes as long as showing a large picture, so tables are kept on disk.
+linear in tetrahedra around the cells' diagonals, and each cell knows whether that is near enough at the 27 points that
+halve it. What lies in a cell that is not, or in none, is for the transform. Baking takes as long as showing a large
+picture, so tables are kept on disk.
 """
 
 from __future__ import annotations
@@ -50,13 +51,12 @@ def bake(show: Show) -> Lattice:
 
 
 def _halved(lattice: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(N, N, N, 3) → (2N - 1, ...): linear between the points."""
-    for axis in range(3):
-        points = np.moveaxis(lattice, axis, 0)
-        halved = np.empty((2 * len(points) - 1, *points.shape[1:]), np.float32)
-        halved[::2], halved[1::2] = points, 0.5 * (points[:-1] + points[1:])
-        lattice = np.moveaxis(halved, 0, axis)
-    return lattice
+    """(N, N, N, 3) → (2N - 1, ...): each point between others lies in the middle of an edge or a diagonal."""
+    halved = np.empty((*(2 * n - 1 for n in lattice.shape[:3]), 3), np.float32)
+    for z, y, x in product(range(2), repeat=3):
+        first = lattice[: len(lattice) - z, : len(lattice) - y, : len(lattice) - x]
+        halved[z::2, y::2, x::2] = 0.5 * (first + lattice[z:, y:, x:])
+    return halved
 
 
 def _coarse(errors: NDArray[np.float32]) -> NDArray[np.bool_]:
@@ -67,5 +67,5 @@ def _coarse(errors: NDArray[np.float32]) -> NDArray[np.bool_]:
 
 
 def _told(shader: DisplayShader) -> bytes:
-    told = f"{CELLS} {TOE} {MOST} {NEAR_ENOUGH}\n{shader.source}".encode()
+    told = f"tetrahedra {CELLS} {TOE} {MOST} {NEAR_ENOUGH}\n{shader.source}".encode()
     return told + b"".join(table.values.tobytes() for table in shader.tables)

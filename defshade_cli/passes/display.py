@@ -25,6 +25,8 @@ _BAND = 2**19
 _PIECE = 64
 """Pixels in a row, that are shown again where one of them changes; less in images whose width is no multiple of it."""
 
+_RGBA = 4
+
 _MIDDLE = 0.5
 """A depth between those that the table's shader writes: 0 where the transform itself is wanted, else 1."""
 
@@ -41,7 +43,8 @@ class DisplayPass:
         self._gpu = gpu
         tables = {each.sampler: _texture(gpu, each.values, smooth=each.smooth) for each in shader.tables}
         self._exact = _Shader(gpu, shader.source, tables)
-        self._table = None if table is None else _Shader(gpu, _BY_TABLE, {"table": _texture(gpu, table, smooth=True)})
+        lattice = None if table is None else _texture(gpu, table.astype(np.float32), smooth=False)
+        self._table = None if lattice is None else _Shader(gpu, _BY_TABLE, lattice=lattice)
         self._last: dict[tuple[str, bool, bool], tuple[Pixels, NDArray[Any]]] = {}
 
     def show(
@@ -72,10 +75,10 @@ class DisplayPass:
         table = self._table if in_bytes else None
         depth = self._gpu.depth_texture((width, rows)) if table else None
         target = allocate(self._gpu, (width, rows), {"shown": (4, "f1" if in_bytes else "f4")}, depth)
-        image = self._gpu.context.texture((width, rows), channels, dtype="f4")
+        image = self._gpu.context.texture((width, rows), _RGBA, dtype="f4")
         shown = np.empty(pixels.shape, np.uint8 if in_bytes else np.float32)
         for top in range(0, height, rows):
-            band = np.ascontiguousarray(pixels[top : top + rows])
+            band = _opaque(pixels[top : top + rows])
             image.write(band, viewport=(0, 0, width, len(band)))
             target.framebuffer.use()
             if table:
@@ -103,10 +106,12 @@ def _in_rows(pieces: NDArray[Any], count: int) -> NDArray[Any]:
 
 
 class _Shader:
-    """display.frag with what it reads. source: GLSL with `vec4 display(vec4 color)`."""
+    """display.frag. source: GLSL with `vec4 display(vec4 color)`, which samples tables or loads a lattice."""
 
-    def __init__(self, gpu: Gpu, source: str, tables: dict[str, Texture]) -> None:
-        self._context, self._screen, self._tables = gpu.context, Screen(gpu), tables
+    def __init__(
+        self, gpu: Gpu, source: str, tables: dict[str, Texture] | None = None, lattice: Texture | None = None
+    ) -> None:
+        self._context, self._screen, self._tables, self._lattice = gpu.context, Screen(gpu), tables or {}, lattice
         generated = {"generated/display.glsl": source}
         self._program = gpu.shaders.program("screen.vert", "display.frag", defines=_DEFINES, generated=generated)
         self._array = self._screen.array(self._program)
@@ -116,19 +121,28 @@ class _Shader:
         self._context.enable_only(moderngl.DEPTH_TEST if depth else moderngl.NOTHING)
         if depth:
             self._context.depth_func = depth
-        for unit, (name, texture) in enumerate({"image": image, **self._tables}.items()):
+        for unit, (name, texture) in enumerate(self._tables.items()):
             texture.use(unit)
             self._program[name] = unit
+        image.bind_to_image(0, read=True, write=False)
+        if self._lattice:
+            self._lattice.bind_to_image(1, read=True, write=False)
         set_uniforms(self._program, {"straight": straight, "brightest": BRIGHTEST, "screen_depth": _MIDDLE})
         self._screen.draw(self._array)
+
+
+def _opaque(pixels: Pixels) -> Pixels:
+    """(H, W, 3 or 4) → (H, W, 4), contiguous."""
+    if pixels.shape[-1] == _RGBA:
+        return np.ascontiguousarray(pixels)
+    return np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=-1)
 
 
 def _texture(gpu: Gpu, values: NDArray[Any], *, smooth: bool) -> Texture:
     """(H, W, C) or (D, H, W, C)."""
     *shape, channels = values.shape
     make = gpu.context.texture if values.ndim == 3 else gpu.context.texture3d
-    kind = "f2" if values.dtype == np.float16 else "f4"
-    texture = gpu.keep(make(tuple(reversed(shape)), channels, np.ascontiguousarray(values).tobytes(), dtype=kind))
+    texture = gpu.keep(make(tuple(reversed(shape)), channels, np.ascontiguousarray(values).tobytes(), dtype="f4"))
     texture.filter = (moderngl.LINEAR, moderngl.LINEAR) if smooth else (moderngl.NEAREST, moderngl.NEAREST)
     texture.repeat_x = texture.repeat_y = False
     if isinstance(texture, moderngl.Texture3D):

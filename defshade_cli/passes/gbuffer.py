@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.planes import Plane, integer_attachments, uses_standard_depth, write_source
+from defshade_cli.gpu.planes import Plane, integer_attachments, planes_read, uses_standard_depth, write_source
 from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.residence import DrawList
 from defshade_cli.gpu.targets import NOWHERE, Part, Target, allocate
@@ -33,9 +33,9 @@ class GBuffer:
 
     def bind(self, program: moderngl.Program, **others: moderngl.Texture | moderngl.TextureArray | None) -> None:
         """Let `program` read the planes, and `others` by the names of their samplers, where it has those."""
-        textures = {f"plane_{name}": texture for name, texture in self.target.textures.items()}
-        bound = {**textures, "plane_depth": self.target.depth, **others}
-        for unit, (name, texture) in enumerate(bound.items()):
+        for unit, plane in enumerate(planes_read(self.planes, self.layout)):
+            self.target.textures[plane.name].bind_to_image(unit, read=True, write=False)
+        for unit, (name, texture) in enumerate({"plane_depth": self.target.depth, **others}.items()):
             if texture and name in program:
                 texture.use(unit)
                 program[name] = unit
