@@ -6,8 +6,9 @@ behind all that any of them showed or shows, or before all of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,12 +110,12 @@ def map_change(
     resolution: int,
 ) -> MapChange | None:
     """By the stored depths (H, W) of what is read of the window; None where nothing changed."""
-    changed = _by_block((old != new).astype(np.float32), window, np.max) > 0.0
+    changed = _by_block(old != new, window, np.logical_or)
     rows, columns = np.nonzero(changed)
     if not len(rows):
         return None
-    least = _by_block(np.minimum(old, new), window, np.min)[changed].astype(np.float64)
-    most = _by_block(np.maximum(old, new), window, np.max)[changed].astype(np.float64)
+    least = _by_block(np.minimum(old, new), window, np.minimum)[changed].astype(np.float64)
+    most = _by_block(np.maximum(old, new), window, np.maximum)[changed].astype(np.float64)
     beyond = _BEYOND * (most - least) + _DEPTH * most + _LEAST_DEPTH
     return MapChange(
         places_from_relative,
@@ -127,18 +128,15 @@ def map_change(
     )
 
 
-def _by_block(
-    values: NDArray[np.float32], window: MapWindow, extreme: Callable[..., NDArray[np.float32]]
-) -> NDArray[np.float32]:
+def _by_block(values: NDArray[Any], window: MapWindow, extreme: np.ufunc) -> NDArray[Any]:
     """(rows, columns): the extreme of what look-ups in each block may read; the map's edge goes on beyond it."""
-    side = window.block + _BEFORE + _BEHIND
-    for axis in (0, 1):
-        low, length, first = (pair[1 - axis] for pair in (window.read[:2], window.read[2:], window.first))
-        before = low - (first * window.block - _BEFORE)
-        behind = (first + window.count[1 - axis]) * window.block + _BEHIND - (low + length)
-        pads = [(before, behind) if axis == other else (0, 0) for other in (0, 1)]
-        windows = np.lib.stride_tricks.sliding_window_view(np.pad(values, pads, mode="edge"), side, axis=axis)
-        values = extreme(windows[:: window.block] if axis == 0 else windows[:, :: window.block], axis=-1)
+    for low, first, count in zip(window.read[1::-1], window.first[::-1], window.count[::-1], strict=True):
+        start, length = (first - 1) * window.block, (count + 2) * window.block
+        behind = length - (low - start) - len(values)
+        padded = np.pad(values, [(low - start, behind), (0, 0)], mode="edge")
+        blocks = padded.reshape(count + 2, window.block, -1)
+        within, last, next_ = (extreme.reduce(b, axis=1) for b in (blocks, blocks[:, -_BEFORE:], blocks[:, :_BEHIND]))
+        values = extreme(within[1:-1], extreme(last[:-2], next_[2:])).T
     return values
 
 
