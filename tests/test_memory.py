@@ -74,7 +74,7 @@ def read_again(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     counted("is_time_varying", lambda prim, *_: prim.GetPath())
     counted("read_material", lambda _, path, *__: path)
     counted("read_bound", lambda prim, *_: prim.GetPath())
-    counted("told_of", lambda prim, *_: prim.GetPath())
+    counted("told_of", lambda said, *_: said.path)
     return counts
 
 

@@ -113,7 +113,7 @@ class Memory:
         if said.type_name != "Mesh" or self._extras.primvars or said.path in self._surfaces:
             return None
         subsets = [] if said.is_leaf else material_subsets(prim)
-        told = told_of(prim, said, time, self._color_of(prim, said, subsets, time))
+        told = told_of(said, time, self._color_of(prim, said, subsets, time))
         return told and Asked(prim, said, subsets, told)
 
     def check(self, asked: Sequence[Asked]) -> list[Polygons | None]:
@@ -133,7 +133,7 @@ class Memory:
 
     def _at_another_time(self, known: Surface, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Surface | None:
         """Read is no more than varies; what turns out to be equal stays the same object."""
-        shown = self._color_primvar(prim, material_subsets(prim), time), self._extras.primvars
+        shown = self._color_of(prim, said, material_subsets(prim), time), self._extras.primvars
         moved = move_surface(known, prim, time) if known.groups and only_points_vary(prim, *shown) else None
         return shared(moved or self._read_surface(prim, time, said), known)
 
@@ -158,26 +158,22 @@ class Memory:
             self._stand_ins[key] = self._as_shown(self._models.read(prim, mode))
         return self._stand_ins[key]
 
-    def _color_of(self, prim: Usd.Prim, said: Said, subsets: list[UsdGeom.Subset], time: Usd.TimeCode) -> str:
-        """As _color_primvar; what follows from bindings alone is found once for all prims with the same."""
-        bindings = self._bound(said.path, prim, said).bindings
-        if subsets:
-            return self._color_primvar(prim, subsets, time)
+    def _color_of(self, prim: Usd.Prim, said: Said, subsets: Iterable[UsdGeom.Subset], time: Usd.TimeCode) -> str:
+        """What stands for displayColor: the primvar that a material bound to the prim reads its colour from."""
+        bound = [self._bound(said.path, prim, said), *[self._bound(str(s.GetPath()), s.GetPrim()) for s in subsets]]
+        return next((color for each in bound if (color := self._color_by(each.bindings, time))), DISPLAY_COLOR)
+
+    def _color_by(self, bindings: Bindings, time: Usd.TimeCode) -> str:
+        """The same of some bindings, empty where none does; found once for all prims with these."""
         if bindings == NOTHING_BOUND:
-            return DISPLAY_COLOR
+            return ""
         color = self._colors.get(bindings)
         if color is None:
-            color = self._color_primvar(prim, subsets, time)
+            read = (self.material(path, time).material.color_primvar for path in bindings.candidates)
+            color = next((name for name in read if name), "")
             if all(path in self._materials for path in bindings.candidates):
                 self._colors[bindings] = color
         return color
-
-    def _color_primvar(self, prim: Usd.Prim, subsets: Iterable[UsdGeom.Subset], time: Usd.TimeCode) -> str:
-        """What stands for displayColor: the primvar that a material bound to the prim reads its colour from."""
-        paths = (prim.GetPath(), *(subset.GetPath() for subset in subsets))
-        bound = (material for path in paths for material in self.bindings(path).candidates)
-        read = (self.material(path, time).material.color_primvar for path in bound)
-        return next((name for name in read if name), DISPLAY_COLOR)
 
     def material(self, path: Sdf.Path, time: Usd.TimeCode) -> ReadMaterial:
         """The material at a path; read once where it does not change over time."""
@@ -230,7 +226,7 @@ class Memory:
     def _is_time_varying(self, prim: Usd.Prim, said: Said) -> bool:
         """Asked only when a second frame is read."""
         if said.path not in self._time_varying:
-            color = self._color_primvar(prim, material_subsets(prim), Usd.TimeCode.Default())
+            color = self._color_of(prim, said, material_subsets(prim), Usd.TimeCode.Default())
             self._time_varying[said.path] = is_time_varying(prim, color, self._extras.primvars, said)
         return self._time_varying[said.path]
 

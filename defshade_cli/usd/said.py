@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 from pxr import Usd, UsdGeom
@@ -14,81 +14,90 @@ from defshade_cli.dataclass import dataclass
 _PRIMVARS, _INDICES, _NORMALS, _MATERIALS = "primvars:", ":indices", "primvars:normals", "material:"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Inherited:
-    """Primvars that a prim hands down to all below it: constant ones, its own or its ancestors'.
+    """Primvars that a prim hands down to all below it, its own and its ancestors'; of no prim none.
 
     read: takes what is made of them, which is the same for thousands of prims.
     """
 
-    primvars: Sequence[UsdGeom.Primvar]
+    prim: Usd.Prim | None
     read: dict[Hashable, Any] = field(default_factory=dict)
 
-
-NOTHING_INHERITED = Inherited(())
-
-
-def inheritable(prim: Usd.Prim) -> Inherited:
-    """What USD finds on a prim and above it for what stands below."""
-    found = UsdGeom.PrimvarsAPI(prim).FindInheritablePrimvars() if prim else ()
-    return Inherited(found) if found else NOTHING_INHERITED
+    @cached_property
+    def primvars(self) -> Sequence[UsdGeom.Primvar]:
+        """As USD finds them: the constant ones."""
+        return UsdGeom.PrimvarsAPI(self.prim).FindInheritablePrimvars() if self.prim else ()
 
 
-class Said(NamedTuple):
+NOTHING_INHERITED = Inherited(None)
+
+
+@dataclass(frozen=True, eq=False)
+class Said:
     """path, type_name: of a prim.  names: of the properties authored on it.
 
+    properties: by name, those of a surface: USD makes all of them in the time that it takes for a few one by one.
     lying: those of its own primvars that may be colours or texture coordinates, in order.
     binding: those of its relationships to materials, likewise.
+    own_primvars: are any authored on it?  inherited: those of its ancestors.
     schemas: applied to it, those of its type too.
     is_leaf: no prim at all stands below; an instance is one.
-    own_primvars: are any authored on it?  inherited: those of its ancestors.
     """
 
     path: str
     type_name: str
+    properties: Mapping[str, Usd.Property]
     names: frozenset[str]
     lying: tuple[str, ...]
     binding: tuple[str, ...]
-    schemas: Sequence[str]
-    is_leaf: bool
     own_primvars: bool
     inherited: Inherited
+    schemas: Sequence[str]
+    is_leaf: bool
 
     @property
     def primvars(self) -> bool:
-        """May any lie on it?"""
-        return self.own_primvars or self.inherited is not NOTHING_INHERITED
+        """Does any lie on it?"""
+        return self.own_primvars or bool(self.inherited.primvars)
+
+    def value(self, name: str, time: Usd.TimeCode) -> Any:
+        """Of an attribute that is authored, or None."""
+        found = self.properties.get(name)
+        return found.Get(time) if isinstance(found, Usd.Attribute) else None
 
 
 class _Names(NamedTuple):
-    """As in Said. primvars: is there any?"""
+    """As in Said."""
 
-    every: frozenset[str]
+    names: frozenset[str]
     lying: tuple[str, ...]
     binding: tuple[str, ...]
-    primvars: bool
+    own_primvars: bool
 
 
 def said_of(
-    prim: Usd.Prim, type_name: str | None = None, inherited: Inherited | None = None, *, clipped: bool = False
+    prim: Usd.Prim,
+    type_name: str | None = None,
+    inherited: Inherited | None = None,
+    *,
+    is_surface: bool = True,
+    clipped: bool = False,
 ) -> Said:
     """type_name, inherited: of the prim, where they are known.
 
     clipped: value clips may say more than is authored, see has_clips.
     """
-    names, lying, binding, primvars = _sorted_out(
-        tuple(prim.GetPropertyNames() if clipped else prim.GetAuthoredPropertyNames())
-    )
+    names = tuple(prim.GetPropertyNames() if clipped else prim.GetAuthoredPropertyNames())
+    properties = (prim.GetProperties() if clipped else prim.GetAuthoredProperties()) if is_surface else ()
     return Said(
         str(prim.GetPath()),
         prim.GetTypeName() if type_name is None else type_name,
-        names,
-        lying,
-        binding,
+        dict(zip(names, properties, strict=is_surface)),
+        *_sorted_out(names),
+        Inherited(prim.GetParent()) if inherited is None else inherited,
         prim.GetAppliedSchemas(),
         not prim.GetAllChildrenNames(),
-        primvars,
-        inheritable(prim.GetParent()) if inherited is None else inherited,
     )
 
 

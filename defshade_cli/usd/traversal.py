@@ -28,7 +28,7 @@ from defshade_cli.usd.memory import Asked, Memory
 from defshade_cli.usd.models.draw_mode import FULL, handed_down, mode_above, takes_effect
 from defshade_cli.usd.polygons.polygons import Polygons
 from defshade_cli.usd.render_settings.render_pass import PassRules
-from defshade_cli.usd.said import Said, inheritable, said_of
+from defshade_cli.usd.said import Inherited, Said, said_of
 from defshade_cli.usd.surfaces.geometry import Surface, is_time_varying
 from defshade_cli.usd.values import STANDS_NOWHERE
 from defshade_cli.usd.xform import IDENTITY, gf_matrix, matrix
@@ -117,7 +117,8 @@ class Traversal:
         kind = nature.kind
         if kind is Kind.SHADING or self._is_pruned(prim):
             return (), above
-        said = said_of(prim, nature.type_name, above.primvars, clipped=self._memory.clipped)
+        is_surface = kind is Kind.GPRIM
+        said = said_of(prim, nature.type_name, above.primvars, is_surface=is_surface, clipped=self._memory.clipped)
         here = self._stand(prim, above, nature, said)
         if here is None:
             return (), above
@@ -137,7 +138,7 @@ class Traversal:
         if said.is_leaf and not is_instance:
             return (), here
         chosen = Usd.TraverseInstanceProxies(predicate) if here.rig else predicate
-        below = here._replace(primvars=inheritable(prim)) if said.own_primvars else here
+        below = here._replace(primvars=Inherited(prim)) if said.own_primvars else here
         return prim.GetFilteredChildren(chosen), below
 
     def _stand(self, prim: Usd.Prim, above: Standing, nature: Nature, said: Said) -> Standing | None:
@@ -323,7 +324,7 @@ class Traversal:
             self._prototypes[key] = None
             above = UsdGeom.Imageable(root.GetParent()).ComputePurposeInfo()
             purpose = str(above.purpose) if above.isInheritable else None
-            primvars = inheritable(root.GetParent())
+            primvars = Inherited(root.GetParent())
             standing = Standing(IDENTITY, False, purpose, mode_above(root), None, here.proxied, primvars)
             self._prototypes[key] = self._read([root], standing, _PROTOTYPE_CHILDREN)
         pieces = self._prototypes[key]

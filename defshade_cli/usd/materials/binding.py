@@ -84,7 +84,9 @@ def read_bound(prim: Usd.Prim, above: Bound, known: Known, said: Said | None = N
     if not own and not above.by_collection:
         return above
     if own == _ONLY_DIRECT and not (above.by_collection or above.by_purpose):
-        direct = _direct(prim, prim.GetAppliedSchemas() if said is None else said.schemas, known)
+        schemas = prim.GetAppliedSchemas() if said is None else said.schemas
+        relationship = prim.GetRelationship(_DIRECT) if said is None else said.properties[_DIRECT]
+        direct = _direct(relationship, schemas, known)
         if direct:
             there = above.bindings.all_purpose
             return above if there and there.stronger else direct
@@ -93,17 +95,16 @@ def read_bound(prim: Usd.Prim, above: Bound, known: Known, said: Said | None = N
     return Bound(_resolve(prim, by_purpose=by_purpose), by_collection, by_purpose)
 
 
-def _direct(prim: Usd.Prim, schemas: Sequence[str], known: Known) -> Bound | None:
-    """The one material that a relationship of the prim's own binds; None where it is for USD to say what holds."""
-    if _BINDING_API not in schemas:
+def _direct(relationship: Usd.Property, schemas: Sequence[str], known: Known) -> Bound | None:
+    """The one material that a relationship of a prim's own binds; None where it is for USD to say what holds."""
+    if _BINDING_API not in schemas or not isinstance(relationship, Usd.Relationship):
         return None
-    relationship = prim.GetRelationship(_DIRECT)
     targets = relationship.GetTargets()
     if len(targets) != 1:
         return None
     target = targets[0]
     if target not in known:
-        material = prim.GetStage().GetPrimAtPath(target)
+        material = relationship.GetStage().GetPrimAtPath(target)
         is_one = bool(material) and material.IsA(UsdShade.Material)
         known[target] = (_bound_to(target, stronger=False), _bound_to(target, stronger=True)) if is_one else None
     bound = known[target]

@@ -69,5 +69,6 @@ def cut(
     else:
         whole = polygons.without_holes().joined()
         drawn = vertices_of(whole, triangulate(whole, issues))
+    drawn, groups = faces.sort(drawn)
     mesh = drawn.mesh(path, double_sided=double_sided, level=level)
-    return Cut(polygons, faces, drawn.split, *faces.sort(mesh), tuple(issues))
+    return Cut(polygons, faces, drawn.split, mesh, groups, tuple(issues))

@@ -187,6 +187,14 @@ class Polygons:
             return said, *[array.tobytes() for array in arrays]
         return said, *[blake2b(np.ascontiguousarray(array).data, digest_size=16).digest() for array in arrays]
 
+    @property
+    def place(self) -> bytes:
+        """Equal for polygons over equal points."""
+        if len(self.points) <= _FEW_CORNERS:
+            return self.points.tobytes()
+        return blake2b(np.ascontiguousarray(self.points).data, digest_size=16).digest()
+
+    @cached_property
     def digest(self) -> Hashable:
         """Equal for polygons that are equal in everything: of few corners their bytes, else a hash of these."""
         arrays = [self.points, self.counts, self.indices, self.faces, self.holes]

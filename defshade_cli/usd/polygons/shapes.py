@@ -9,11 +9,18 @@ from defshade_cli.usd.polygons.polygons import Polygons
 
 
 class Shapes:
-    """The polygons of the surfaces that are in use."""
+    """The polygons of the surfaces that are in use.
+
+    Most have points of their own: of others alone is asked whether all of them is equal.
+    """
 
     def __init__(self) -> None:
-        self._known: WeakValueDictionary[Hashable, Polygons] = WeakValueDictionary()
+        self._first: WeakValueDictionary[Hashable, Polygons] = WeakValueDictionary()
+        self._others: WeakValueDictionary[Hashable, Polygons] = WeakValueDictionary()
 
     def shared(self, polygons: Polygons) -> Polygons:
         """The polygons that were given first, of those that equal these."""
-        return self._known.setdefault(polygons.digest(), polygons)
+        first = self._first.setdefault(polygons.place, polygons)
+        if first is polygons or first.digest == polygons.digest:
+            return first
+        return self._others.setdefault(polygons.digest, polygons)

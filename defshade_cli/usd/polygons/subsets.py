@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom, UsdShade
 
 from defshade_cli.dataclass import dataclass
-from defshade_cli.scene.geometry import Mesh
+from defshade_cli.usd.polygons.vertices import Vertices
+from defshade_cli.usd.said import Said
 from defshade_cli.usd.values import integers
 
 
@@ -41,19 +42,19 @@ class Faces:
         """The paths of the groups that these faces (N,) are in, in order."""
         if self.group is None:
             return self.paths if len(faces) else ()
-        return tuple(self.paths[number] for number in np.unique(self.group[faces]))
+        return tuple([self.paths[number] for number in np.flatnonzero(np.bincount(self.group[faces])).tolist()])
 
-    def sort(self, mesh: Mesh) -> tuple[Mesh, tuple[FaceGroup, ...]]:
-        """The mesh with its triangles sorted into groups, which cover them all."""
+    def sort(self, drawn: Vertices) -> tuple[Vertices, tuple[FaceGroup, ...]]:
+        """The same with its triangles sorted into groups, which cover them all."""
         if self.group is None:
-            whole = FaceGroup(self.paths[0], 0, len(mesh.triangles))
-            return mesh, (whole,) if whole.count else ()
-        group = self.group[mesh.faces]
+            whole = FaceGroup(self.paths[0], 0, len(drawn.triangles))
+            return drawn, (whole,) if whole.count else ()
+        group = self.group[drawn.faces]
         order = np.argsort(group, kind="stable")
-        counts = np.bincount(group, minlength=len(self.paths))
-        firsts = np.cumsum(counts) - counts
-        groups = (FaceGroup(p, int(f), int(c)) for p, f, c in zip(self.paths, firsts, counts, strict=True) if c)
-        return replace(mesh, triangles=mesh.triangles[order], faces=mesh.faces[order]), tuple(groups)
+        counts = np.bincount(group, minlength=len(self.paths)).tolist()
+        firsts = accumulate(counts, initial=0)
+        groups = tuple([FaceGroup(p, first, c) for p, first, c in zip(self.paths, firsts, counts, strict=False) if c])
+        return drawn._replace(triangles=drawn.triangles[order], faces=drawn.faces[order]), groups
 
 
 def material_subsets(prim: Usd.Prim) -> list[UsdGeom.Subset]:
@@ -64,14 +65,13 @@ def material_subsets(prim: Usd.Prim) -> list[UsdGeom.Subset]:
     return [s for s in subsets if s.GetElementTypeAttr().Get() == UsdGeom.Tokens.face]
 
 
-def read_faces(
-    prim: Usd.Prim, path: str, subsets: list[UsdGeom.Subset], time: Usd.TimeCode, issues: list[str]
-) -> Faces:
+def read_faces(said: Said, subsets: list[UsdGeom.Subset], time: Usd.TimeCode, issues: list[str]) -> Faces:
     """Which subset holds each face, the gprim itself those that none does."""
     if not subsets:
-        return Faces((path,))
-    group = _group_of_face(subsets, UsdGeom.Mesh(prim).GetFaceCount(time), time, issues)
-    return Faces((path, *(str(subset.GetPath()) for subset in subsets)), group)
+        return Faces((said.path,))
+    counts = integers(said.value("faceVertexCounts", time))
+    group = _group_of_face(subsets, 0 if counts is None else len(counts), time, issues)
+    return Faces((said.path, *(str(subset.GetPath()) for subset in subsets)), group)
 
 
 def _group_of_face(

@@ -18,7 +18,7 @@ from defshade_cli.usd.polygons.end_to_end import LARGEST
 from defshade_cli.usd.polygons.mesh import sizes_of
 from defshade_cli.usd.polygons.polygons import SCHEMES, Interpolation, Primvar, Scheme
 from defshade_cli.usd.polygons.primvars import uv_width
-from defshade_cli.usd.said import NOTHING_INHERITED, Inherited, Said
+from defshade_cli.usd.said import Inherited, Said
 from defshade_cli.usd.values import are_finite, floats, integers
 
 _PRIMVARS, _INDICES = "primvars:", ":indices"
@@ -27,6 +27,9 @@ _VERTEX: Interpolation = "vertex"
 _RARE = frozenset({"velocities", "primvars:normals:indices"})
 _TYPES = Sdf.ValueTypeNames
 _NORMALS = frozenset({_TYPES.Normal3fArray, _TYPES.Float3Array, _TYPES.Vector3fArray})
+_ALWAYS = Usd.TimeCode.Default()
+"""Of what does not vary."""
+
 _NO_HOLES = np.empty(0, np.int32)
 
 
@@ -69,51 +72,47 @@ _MORE = Lying("normals", "", np.empty((0, 3), np.float32), "constant")
 """Stands for what needs to be looked into."""
 
 
-def told_of(prim: Usd.Prim, said: Said, time: Usd.TimeCode, color: str) -> Told | None:
+def told_of(said: Said, time: Usd.TimeCode, color: str) -> Told | None:
     """None where there is more to it. color: as read_surface has it."""
     names = said.names
     if not _RARE.isdisjoint(names):
         return None
-    indices = prim.GetAttribute("faceVertexIndices").Get(time)
+    indices = said.value("faceVertexIndices", time)
     if not isinstance(indices, Vt.IntArray) or not 0 < len(indices) <= LARGEST:
         return None
-    counts, points = prim.GetAttribute("faceVertexCounts").Get(time), prim.GetAttribute("points").Get(time)
+    counts, points = said.value("faceVertexCounts", time), said.value("points", time)
     if not (isinstance(counts, Vt.IntArray) and isinstance(points, Vt.Vec3fArray) and counts and points):
         return None
-    scheme = prim.GetAttribute("subdivisionScheme").Get() if "subdivisionScheme" in names else "catmullClark"
+    scheme = said.value("subdivisionScheme", _ALWAYS) if "subdivisionScheme" in names else "catmullClark"
     sizes = sizes_of(np.asarray(counts))
     if scheme not in SCHEMES or sizes.corners != len(indices):
         return None
-    normals = _normals(prim, said, time) if scheme == "none" else None
-    carried = _carried(prim, said, time, color) if said.primvars else ()
+    normals = _normals(said, time) if scheme == "none" else None
+    carried = _carried(said, time, color) if said.primvars else ()
     if normals is _MORE or carried is None:
         return None
+    holes = integers(said.value("holeIndices", time)) if "holeIndices" in names else None
     return Told(
         np.asarray(points),
         sizes.counts,
         np.asarray(indices),
         sizes.faces,
-        _holes(prim, time) if "holeIndices" in names else _NO_HOLES,
+        _NO_HOLES if holes is None else holes,
         scheme,
-        "orientation" in names and prim.GetAttribute("orientation").Get() == UsdGeom.Tokens.leftHanded,
+        "orientation" in names and said.value("orientation", _ALWAYS) == UsdGeom.Tokens.leftHanded,
         normals,
         carried,
     )
 
 
-def _holes(prim: Usd.Prim, time: Usd.TimeCode) -> NDArray[np.integer]:
-    holes = integers(prim.GetAttribute("holeIndices").Get(time))
-    return _NO_HOLES if holes is None else holes
-
-
-def _normals(prim: Usd.Prim, said: Said, time: Usd.TimeCode) -> Lying | None:
+def _normals(said: Said, time: Usd.TimeCode) -> Lying | None:
     """Those that count, None without any; _MORE where they are no vectors, or the same everywhere."""
     if "primvars:normals" in said.names:
-        attribute, fallback = prim.GetAttribute("primvars:normals"), _CONSTANT
+        attribute, fallback = said.properties["primvars:normals"], _CONSTANT
         if attribute.GetTypeName() not in _NORMALS:
             return _MORE
     elif "normals" in said.names:
-        attribute, fallback = prim.GetAttribute("normals"), _VERTEX
+        attribute, fallback = said.properties["normals"], _VERTEX
     else:
         return None
     value, interpolation = attribute.Get(time), attribute.GetMetadata("interpolation") or fallback
@@ -122,16 +121,15 @@ def _normals(prim: Usd.Prim, said: Said, time: Usd.TimeCode) -> Lying | None:
     return Lying("normals", "", np.asarray(value), interpolation)
 
 
-def _carried(prim: Usd.Prim, said: Said, time: Usd.TimeCode, color: str) -> tuple[Lying, ...] | None:
+def _carried(said: Said, time: Usd.TimeCode, color: str) -> tuple[Lying, ...] | None:
     """Colour, opacity and texture coordinates, its own or inherited; None where there is more to them."""
     handed_down = _inherited(said.inherited, time, color)
     if handed_down is None:
         return None
     found = {**handed_down}
     for name in said.lying:
-        indices = prim.GetAttribute(name + _INDICES) if name + _INDICES in said.names else None
         short = name[len(_PRIMVARS) :]
-        lying = _lying(short, prim.GetAttribute(name), indices, time, color)
+        lying = _lying(short, said.properties[name], said.properties.get(name + _INDICES), time, color)
         if lying is _MORE or (lying is None and short in found):
             return None
         found[short] = lying
@@ -144,7 +142,7 @@ _NOTHING_FOUND: _Found = {}
 
 def _inherited(inherited: Inherited, time: Usd.TimeCode, color: str) -> _Found | None:
     """The same of what ancestors hand down, by name; made once for all that is below them."""
-    if inherited is NOTHING_INHERITED:
+    if not inherited.primvars:
         return _NOTHING_FOUND
     key = time, color
     if key not in inherited.read:
@@ -158,15 +156,17 @@ def _inherited(inherited: Inherited, time: Usd.TimeCode, color: str) -> _Found |
 
 
 def _lying(
-    name: str, attribute: Usd.Attribute, indices: Usd.Attribute | None, time: Usd.TimeCode, color: str
+    name: str, attribute: Usd.Property, indices: Usd.Property | None, time: Usd.TimeCode, color: str
 ) -> Lying | None:
     """A primvar as that for which it counts; None of one that is not read, _MORE where there is more to it."""
-    value = attribute.Get(time) if attribute else None
+    if not isinstance(attribute, Usd.Attribute):
+        return _MORE
+    value = attribute.Get(time)
     if name == color:
         return _lying_color(name, attribute, value, indices, time)
     if name == "displayOpacity":
         return _laid("display_opacity", name, attribute, floats(value, 1), indices, time)
-    width = 2 if isinstance(value, Vt.Vec2fArray) else attribute and uv_width(attribute)
+    width = 2 if isinstance(value, Vt.Vec2fArray) else uv_width(attribute)
     if not width:
         return None
     values = floats(value, width)
@@ -176,9 +176,9 @@ def _lying(
 
 
 def _lying_color(
-    name: str, attribute: Usd.Attribute, value: object, indices: Usd.Attribute | None, time: Usd.TimeCode
+    name: str, attribute: Usd.Attribute, value: object, indices: Usd.Property | None, time: Usd.TimeCode
 ) -> Lying:
-    if not attribute or uv_width(attribute):
+    if uv_width(attribute):
         return _MORE
     colors = in_rec709(attribute, value) if is_color(attribute) else value
     return _laid("display_color", name, attribute, floats(colors, 3), indices, time)
@@ -189,7 +189,7 @@ def _laid(
     name: str,
     attribute: Usd.Attribute,
     values: NDArray[np.float32] | None,
-    indices: Usd.Attribute | None,
+    indices: Usd.Property | None,
     time: Usd.TimeCode,
 ) -> Lying:
     chosen = None if indices is None else indices.Get(time)

@@ -17,6 +17,12 @@ SchemeName = Literal["catmullClark", "loop", "bilinear"]
 BoundaryRule = Literal["none", "edgeOnly", "edgeAndCorner"]
 TriangleRule = Literal["catmullClark", "smooth"]
 
+_CHOICES: dict[str, tuple[str, ...]] = {
+    "scheme": get_args(SchemeName),
+    "interpolate_boundary": get_args(BoundaryRule),
+    "triangle_subdivision_rule": get_args(TriangleRule),
+}
+
 
 def _no_indices() -> NDArray[np.int32]:
     return np.zeros(0, np.int32)
@@ -63,9 +69,9 @@ class Topology:
         self._check_corners()
 
     def _check_rules(self) -> None:
-        _require_choice("scheme", self.scheme, get_args(SchemeName))
-        _require_choice("interpolate_boundary", self.interpolate_boundary, get_args(BoundaryRule))
-        _require_choice("triangle_subdivision_rule", self.triangle_subdivision_rule, get_args(TriangleRule))
+        for name, choices in _CHOICES.items():
+            if (value := getattr(self, name)) not in choices:
+                raise ValueError(f"{name} is {value!r}, not one of {', '.join(choices)}")
 
     def _check_faces(self) -> None:
         counts = self.face_counts
@@ -85,6 +91,8 @@ class Topology:
 
     def _check_creases(self) -> None:
         lengths = self.crease_lengths
+        if not (len(lengths) or len(self.crease_indices) or len(self.crease_sharpnesses)):
+            return
         if len(lengths) and lengths.min() < 2:
             raise ValueError("a crease has fewer than two vertices")
         total = int(lengths.sum(dtype=np.int64))
@@ -100,6 +108,8 @@ class Topology:
     def _check_corners(self) -> None:
         if len(self.corner_indices) != len(self.corner_sharpnesses):
             raise ValueError(f"{len(self.corner_sharpnesses)} sharpnesses for {len(self.corner_indices)} corners")
+        if not len(self.corner_indices):
+            return
         _require_range("corner index", self.corner_indices, self.vertex_count, "points")
         if np.isnan(self.corner_sharpnesses).any():
             raise ValueError("a corner sharpness is not a number")
@@ -144,6 +154,8 @@ class Topology:
 
     def crease_edges(self) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
         """(N, 2) vertex pairs of all creases and (N,) their sharpness."""
+        if not len(self.crease_indices):
+            return np.empty((0, 2), np.int32), self.crease_sharpnesses
         chain_starts = np.cumsum(self.crease_lengths)[:-1]
         joined = np.ones(max(len(self.crease_indices) - 1, 0), bool)
         joined[chain_starts - 1] = False
@@ -154,12 +166,8 @@ class Topology:
         return pairs, sharpness
 
 
-def _require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise ValueError(f"{name} is {value!r}, not one of {', '.join(choices)}")
-
-
 def _require_range(name: str, indices: NDArray[Any], count: int, of: str) -> None:
+    if not len(indices) or 0 <= indices.min() <= indices.max() < count:
+        return
     outside = (indices < 0) | (indices >= count)
-    if outside.any():
-        raise ValueError(f"{name} {indices[outside.argmax()]} is outside the {count} {of}")
+    raise ValueError(f"{name} {indices[outside.argmax()]} is outside the {count} {of}")

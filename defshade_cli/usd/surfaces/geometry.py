@@ -146,7 +146,7 @@ def surface_of(
         polygons = shapes.shared(polygons.without_constants())
     mesh = None if polygons.scheme == "none" else UsdGeom.Mesh(prim)
     control = read_control(mesh, said, polygons, time, issues) if mesh else smooth_control(polygons)
-    faces = read_faces(prim, path, material_subsets(prim) if subsets is None else subsets, time, issues)
+    faces = read_faces(said, material_subsets(prim) if subsets is None else subsets, time, issues)
     return Surface(
         path=path,
         polygons=polygons,
