@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.usd.polygons.cut import cut
+from defshade_cli.usd.polygons.end_to_end import LARGEST
 from defshade_cli.usd.polygons.normals import with_normals
 from defshade_cli.usd.polygons.polygons import Interpolation, Polygons, Primvar, Scheme
 from defshade_cli.usd.polygons.small_meshes import Shaped, shape_all
@@ -19,8 +20,8 @@ INTERPOLATIONS: tuple[Interpolation, ...] = ("constant", "uniform", "varying", "
 
 
 def mesh(rng: np.random.Generator, scheme: Scheme, left_handed: bool) -> Polygons:
-    """Faces of 3 and 4 corners anywhere among some points, some of them holes."""
-    counts = rng.integers(3, 5, rng.integers(1, 9))
+    """Faces of 3 to 7 corners anywhere among some points, some of them holes."""
+    counts = rng.integers(3, rng.integers(4, 9), rng.integers(1, 9))
     points = rng.normal(size=(rng.integers(4, 12), 3)).astype(np.float32)
     indices = rng.integers(0, len(points), counts.sum())
     holes = rng.integers(0, len(counts), rng.integers(len(counts)) if rng.random() < 0.3 else 0)
@@ -97,6 +98,8 @@ def test_what_lies_on_them_is_as_alone_too(seed: int) -> None:
 
 
 def test_what_is_not_small_is_left_out() -> None:
-    many_corners = Polygons(np.zeros((5, 3), np.float32), np.array([5]), np.arange(5), np.zeros(1, np.int32))
-    assert shape_all([many_corners]) == {}
+    corners = LARGEST + 1
+    whole = Polygons(np.zeros((5, 3), np.float32), np.array([corners]), np.zeros(corners, int), np.zeros(1, np.int32))
+    nothing = Polygons(whole.points, np.array([5]), np.arange(5), np.zeros(1, np.int32), holes=np.zeros(1, np.int32))
+    assert shape_all([whole, nothing]) == {}
     assert shape_all([]) == {}

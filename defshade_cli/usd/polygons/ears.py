@@ -3,6 +3,7 @@
 A corner is an ear when its triangle holds no other corner; a simple polygon always has two (Meisters 1975),
 and only reflex corners can lie inside (Eberly, "Triangulation by Ear Clipping"). Each round clips every
 polygon of ears that are no neighbours: common shapes take some log n rounds, a spiral, which has but two, n/2.
+What comes out for a polygon does not depend on the others.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ class _Rings:
         self.left = np.full(count, size)
         self.turn = self._turns(corners.ravel())
         self.ear = np.zeros(count * size, bool)
-        self._priority = corners.ravel() * 2654435761 % 2**32  # Knuth's hash: neighbours in no order
+        self._priority = np.tile(np.arange(size) * 2654435761 % 2**32, count)  # Knuth's hash: neighbours in no order
         self._key = (self.polygon.reshape(count, size) + 0.5 * _unit(uv[..., 0])).ravel()
         reflex = np.flatnonzero(self.turn <= 0.0)
         self._reflex = reflex[np.argsort(self._key[reflex])]

@@ -10,14 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.usd.polygons.end_to_end import LARGEST, Row, blocks, lay, signature, starts_of
+from defshade_cli.usd.polygons.end_to_end import LARGEST, Row, blocks, lay, signature
 from defshade_cli.usd.polygons.normals import with_normals
 from defshade_cli.usd.polygons.polygons import Polygons, Primvar
 from defshade_cli.usd.polygons.triangulation import triangulate
 from defshade_cli.usd.polygons.vertices import Vertices, vertices_of
-
-_MOST_CORNERS = 4
-"""A face: the ears of larger ones are found in an order that depends on what stands beside them."""
 
 
 class Shaped(NamedTuple):
@@ -30,7 +27,7 @@ class Shaped(NamedTuple):
 def shape_all(meshes: Iterable[Polygons]) -> dict[Polygons, Shaped]:
     """Those of `meshes` that are small."""
     alike: dict[Hashable, list[Polygons]] = defaultdict(list)
-    for mesh in _small(dict.fromkeys(meshes)):
+    for mesh in filter(_is_small, dict.fromkeys(meshes)):
         alike[signature(mesh)].append(mesh)
     shaped: dict[Polygons, Shaped] = {}
     for group in alike.values():
@@ -40,13 +37,9 @@ def shape_all(meshes: Iterable[Polygons]) -> dict[Polygons, Shaped]:
     return shaped
 
 
-def _small(meshes: Iterable[Polygons]) -> Iterable[Polygons]:
-    few = [m for m in meshes if 0 < len(m.indices) <= LARGEST and len(m.holes) < len(m.counts)]
-    if not few:
-        return ()
-    counts = [mesh.counts for mesh in few]
-    most = np.maximum.reduceat(np.concatenate(counts), starts_of(counts))
-    return compress(few, (most <= _MOST_CORNERS).tolist())
+def _is_small(mesh: Polygons) -> bool:
+    """Not so, too, where no face may be left beside its holes."""
+    return 0 < len(mesh.indices) <= LARGEST and len(mesh.holes) < len(mesh.counts)
 
 
 def _joined(meshes: Sequence[Polygons]) -> Iterator[tuple[Sequence[Polygons], Row]]:
