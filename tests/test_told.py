@@ -7,7 +7,9 @@ import pytest
 from pxr import Usd, UsdGeom
 
 from defshade_cli.usd.polygons.checked import check_all
-from defshade_cli.usd.polygons.primvars import DISPLAY_COLOR
+from defshade_cli.usd.polygons.lying import sound_carried
+from defshade_cli.usd.polygons.polygons import Polygons
+from defshade_cli.usd.polygons.primvars import DISPLAY_COLOR, count_elements, read_carried
 from defshade_cli.usd.polygons.told import told_of
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.said import said_of
@@ -37,6 +39,15 @@ ALONE = {
     "a colour like coordinates": "texCoord3f[] primvars:displayColor = [(1, 0, 0)]",
     "one opacity": "float primvars:displayOpacity = 0.5",
     "no value": "texCoord2f[] primvars:st",
+    "indices": "texCoord2f[] primvars:st = [(0, 1), (1, 1)]\n int[] primvars:st:indices = [1]",
+    "indices of nothing": "texCoord2f[] primvars:st = [(0, 1), (1, 1)]\n int[] primvars:st:indices = [2]",
+    "normals": 'normal3f[] normals = [(0, 0, 2), (0, 1, 1)] (interpolation = "uniform")',
+    "normals in doubles": 'double3[] primvars:normals = [(0, 0, 2), (0, 1, 1)] (interpolation = "uniform")',
+    "normals by indices": f"""normal3f[] primvars:normals = [(0, 0, 2), (0, 1, 1)] (interpolation = "faceVarying")
+        int[] primvars:normals:indices = [{", ".join("01100110")}]""",
+    "normals by wrong ones": f"""normal3f[] primvars:normals = [(0, 0, 2), (0, 1, 1)] (interpolation = "faceVarying")
+        int[] primvars:normals:indices = [{", ".join("01100119")}]""",
+    "one normal for all": "normal3f[] primvars:normals = [(0, 0, 2)]",
 }
 
 
@@ -53,12 +64,25 @@ def test_of_one_mesh(said: str) -> None:
 
 
 def test_what_is_common_is_asked_so() -> None:
-    common = {name: said for name, said in ALONE.items() if name in ("holes", "doubles", "a colour in doubles")}
-    for said in common.values():
+    for said in (ALONE[name] for name in ("holes", "doubles", "a colour in doubles", "indices", "normals by indices")):
         stage = stage_of(f'def Mesh "m" {{ {QUADS} {said} \n }}')
         prim = stage.GetPrimAtPath("/m")
         told = told_of(said_of(prim), TIME, DISPLAY_COLOR)
         assert told and check_all([told])[0]
+
+
+@pytest.mark.parametrize("said", ALONE.values(), ids=ALONE)
+def test_of_a_solid(said: str) -> None:
+    stage = stage_of(f'def Cube "c" {{ {said} \n }}')
+    prim = stage.GetPrimAtPath("/c")
+    elements = count_elements(6, 8, 24)
+    together = sound_carried(said_of(prim), TIME, DISPLAY_COLOR, elements)
+    issues: list[str] = []
+    alone = read_carried(prim, TIME, elements, issues)
+    if together:
+        bare = Polygons(np.zeros((8, 3), np.float32), np.full(6, 4), np.zeros(24, int), np.arange(6, dtype=np.int32))
+        assert not issues
+        assert together.laid_on(bare).digest == alone.laid_on(bare).digest
 
 
 OWN = f"""

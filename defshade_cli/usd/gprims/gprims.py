@@ -17,6 +17,7 @@ from pxr import Usd
 
 from defshade_cli.usd.gprims.cages import capsule_cage, cone_cage, frustum_cage, sphere_cage
 from defshade_cli.usd.gprims.revolution import SEGMENTS, Strip, arc, disk, revolve, side
+from defshade_cli.usd.polygons.lying import sound_carried
 from defshade_cli.usd.polygons.polygons import Polygons
 from defshade_cli.usd.polygons.primvars import Elements, count_elements, read_carried
 from defshade_cli.usd.said import Said
@@ -124,7 +125,9 @@ def read_solid(
     polygons = _built(build, axis, tuple(sizes))
     if not said.primvars:
         return polygons
-    return read_carried(prim, time, _elements(polygons), issues, color).laid_on(polygons)
+    elements = _elements(polygons)
+    carried = sound_carried(said, time, color, elements) or read_carried(prim, time, elements, issues, color)
+    return carried.laid_on(polygons)
 
 
 @lru_cache(maxsize=_MOST_KEPT)

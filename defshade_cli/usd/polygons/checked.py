@@ -13,17 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.usd.polygons.end_to_end import blocks, lay_bare, starts_of
+from defshade_cli.usd.polygons.lying import Lying, carried
 from defshade_cli.usd.polygons.normals import unit_normals
 from defshade_cli.usd.polygons.polygons import Interpolation, Polygons, Primvar
-from defshade_cli.usd.polygons.primvars import count_elements
-from defshade_cli.usd.polygons.told import Lying, Told
+from defshade_cli.usd.polygons.primvars import NOTHING_CARRIED, count_elements
+from defshade_cli.usd.polygons.told import Told
 
 
 def check_all(meshes: Sequence[Told]) -> list[Polygons | None]:
     """The polygons of each mesh that is sound, None of any other."""
     sound = {number for number, drawn in enumerate(_are_drawn(meshes)) if drawn}
     sound -= {number for number in sound if not _fits(meshes[number])}
-    lying = [(number, each) for number in sound for each in meshes[number].carried]
+    lying = [(number, each) for number in sound for each in meshes[number].lying]
     sound -= {
         number for (number, _), fine in zip(lying, _are_sound([each for _, each in lying]), strict=True) if not fine
     }
@@ -47,12 +48,10 @@ def _are_drawn(meshes: Sequence[Told]) -> list[bool]:
 
 def _fits(mesh: Told) -> bool:
     """Have its primvars and normals as many values as they need?"""
-    lying = mesh.carried if mesh.normals is None else (mesh.normals, *mesh.carried)
-    if not lying:
+    if not mesh.lying:
         return True
     due = count_elements(len(mesh.counts), len(mesh.points), len(mesh.indices))
-    sizes = [(len(each.values if each.indices is None else each.indices), each.interpolation) for each in lying]
-    return all(size == due.get(interpolation, 0) for size, interpolation in sizes)
+    return all(each.size == due.get(each.interpolation, 0) for each in mesh.lying)
 
 
 def _are_sound(lying: Sequence[Lying]) -> list[bool]:
@@ -88,7 +87,7 @@ def _unit_normals(meshes: Mapping[int, Told]) -> dict[int, Primvar]:
     for (_, interpolation), numbers in alike.items():
         for block in blocks(numbers, [len(meshes[number].indices) for number in numbers]):
             row = lay_bare([meshes[number] for number in block])
-            values = np.concatenate([normals[number].values for number in block])
+            values = np.concatenate([normals[number].primvar.values for number in block])
             units, clear = unit_normals(row, Primvar(values, interpolation))
             runs = pairwise(row.starts(interpolation).tolist())
             for number, run, is_clear in zip(block, runs, clear.tolist(), strict=True):
@@ -98,8 +97,6 @@ def _unit_normals(meshes: Mapping[int, Told]) -> dict[int, Primvar]:
 
 
 def _polygons(mesh: Told, normals: Primvar | None) -> Polygons:
-    others = {each.field: each.primvar for each in mesh.carried if each.field != "uvs"}
-    uvs = {each.name: each.primvar for each in mesh.carried if each.field == "uvs"}
     return Polygons(
         mesh.points,
         mesh.counts,
@@ -109,7 +106,5 @@ def _polygons(mesh: Told, normals: Primvar | None) -> Polygons:
         mesh.scheme,
         mesh.left_handed,
         normals,
-        others.get("display_color"),
-        others.get("display_opacity"),
-        uvs,
+        *(carried(mesh.carried) if mesh.carried else NOTHING_CARRIED),
     )
