@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from build import bulb, quad, scene, sun
 from defshade_cli import render
+from defshade_cli.passes import hidden_lights
+from defshade_cli.passes.hidden_lights import HiddenLights
 from defshade_cli.passes.light_lists import TILE, list_lights, tile_boxes
 from defshade_cli.passes.screen import regions_of
 from defshade_cli.plan import make_plan
@@ -33,6 +35,7 @@ SCENES = [
     "light_mesh",
     "materials",
 ]
+HIDING = ["light_cone", "light_many"]
 WINDOW = np.array([-0.8, 0.6, -0.5, 0.45])
 SIZE = (5 * TILE - 7, 3 * TILE + 1)
 
@@ -51,6 +54,23 @@ def test_the_picture_is_that_of_the_volumes(name: str, scenes: Path) -> None:
     """But for the order in which floats are added: 35 lights of the showcase, 6e-8 each."""
     for volumes, other in differences(scenes / f"{name}.usda"):
         np.testing.assert_allclose(other, volumes, rtol=35 * 6e-8, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", HIDING)
+def test_lights_that_do_not_arrive_are_left_out_of_no_pixel(
+    name: str, scenes: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the bit, also where a sample moves the eye and the map."""
+    shares, find = [], HiddenLights.find
+    monkeypatch.setattr(HiddenLights, "find", lambda *told: (found := find(*told), shares.append(found.mean()))[0])
+    for options in ({}, {"samples": 2, "layout": "packed"}):
+        pictures = []
+        for worthwhile in (np.inf, 0.0):
+            monkeypatch.setattr(hidden_lights, "_WORTHWHILE", worthwhile)
+            film = render(scenes / f"{name}.usda", size=(150, 70), lighting="tiles", **options)
+            pictures.append(film.layers["beauty"])
+        np.testing.assert_array_equal(*pictures)
+    assert max(shares) > 0.0
 
 
 @pytest.mark.parametrize("options", [{"samples": 3}, {"layout": "rgba8"}, {"shading": "classic"}, {"shadows": False}])

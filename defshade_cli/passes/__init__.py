@@ -9,7 +9,7 @@ A sample:
     gbuffer, culling                 opaque geometry into the planes of gpu/planes.py
     emitters, shadow…, shadows       what stands for each light in it, and the maps seen from there
     emission, lighting, volumes      what shines by itself; each light as its volume
-    light_tiles, light_lists         many lights, by tiles of the image
+    light_tiles, light_lists, hidden_lights   many lights, by tiles of the image
     light_whole                      lights that reach all of it
     environment, dome…, sky…         skies, and how much of them is open
     lobe_rays, lamp_records          what lobes mirror, by rays of each pixel's own

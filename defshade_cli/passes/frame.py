@@ -53,13 +53,13 @@ class Frame:
             self._radiance[key] = allocate(self._gpu, size, {"radiance": (components, "f4")}, depth)
         return self._radiance[key]
 
-    def of_tiles(self, name: str, components: int, tiles: Size) -> Target:
-        """A texture `name` of so many floats for each of (columns, rows) tiles. Raises GpuError."""
+    def of_tiles(self, name: str, components: int, tiles: Size, dtype: str = "f4") -> Target:
+        """A texture `name` of so many numbers for each of (columns, rows) tiles, or one a word. Raises GpuError."""
         known = self._tiles.get(name)
         if known is None or known.framebuffer.size != tiles:
             if known:
                 known.release()
-            self._tiles[name] = allocate(self._gpu, tiles, {name: (components, "f4")})
+            self._tiles[name] = allocate(self._gpu, tiles, dict.fromkeys(name.split(), (components, dtype)))
         return self._tiles[name]
 
     def tile_runs(self, tiles: Size) -> moderngl.Texture:

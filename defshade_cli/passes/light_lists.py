@@ -35,14 +35,17 @@ class LightLists:
     lights: NDArray[np.uint32]
 
 
-def list_lights(bounds: LightBounds, boxes: NDArray[np.float64]) -> LightLists:
-    """Of (rows, columns, 2, 3) boxes."""
+def list_lights(bounds: LightBounds, boxes: NDArray[np.float64], hidden: NDArray[np.bool_] | None = None) -> LightLists:
+    """Of (rows, columns, 2, 3) boxes. hidden: (rows, columns, L) lights that do not arrive there, where it is known."""
     blocks, members = _blocks(boxes)
     light, block = (each.ravel() for each in np.indices((len(bounds), len(blocks))))
     near = bounds.meet(light, blocks[block])
     light, block = light[near], block[near]
     tile, light = members[block].ravel(), light.repeat(members.shape[1])
     light, tile = light[tile >= 0], tile[tile >= 0]
+    if hidden is not None:
+        arrive = ~hidden.reshape(-1, len(bounds))[tile, light]
+        light, tile = light[arrive], tile[arrive]
     near = bounds.meet(light, boxes.reshape(-1, 2, 3)[tile])
     tile, light = np.divmod(np.sort(tile[near] * len(bounds) + light[near]), max(len(bounds), 1))
     counts = np.bincount(tile, minlength=boxes[..., 0, 0].size)

@@ -20,7 +20,8 @@ from defshade_cli.gpu.records import record
 from defshade_cli.gpu.residence import LIGHT_BLOCK, LIGHT_LISTS, RecordBuffer
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer
-from defshade_cli.passes.light_lists import TILE, list_lights
+from defshade_cli.passes.hidden_lights import HiddenLights, are_worth_finding
+from defshade_cli.passes.light_lists import TILE, LightLists, list_lights
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.light_traits import Traits, common_traits, lights_source
 from defshade_cli.passes.lighting import LightingVariant
@@ -50,7 +51,7 @@ class LightTiles:
         self._block = RecordBuffer(gpu, LIGHT_BLOCK, uniform=True)
         self._lists = RecordBuffer(gpu, LIGHT_LISTS)
         self._depths = TileDepths(gpu, frame)
-        self._screen = Screen(gpu)
+        self._screen, self._hidden = Screen(gpu), HiddenLights(gpu, frame, self._most)
         self._array = cache(lambda variant, common: self._screen.array(_compile(gpu, variant, common, self._most)))
 
     def begin(self, gbuffer: GBuffer, plan: Plan, sample: Sample, drawn: Drawn | None = None) -> None:
@@ -60,6 +61,7 @@ class LightTiles:
         if drawn:
             depths = np.where(_are_drawn(drawn, depths.shape[:2])[..., None], depths, _NOTHING)
         self._boxes = boxes_at(depths, plan, sample)
+        self._hidden.begin(gbuffer, plan)
         self._camera_from_relative = inverse_rigid(placement(plan.camera, sample))
 
     def add(
@@ -72,8 +74,9 @@ class LightTiles:
         tables: LightTables = NO_TABLES,
     ) -> None:
         """All `lights`, records (L,), on top of the targets; those that cost more, for shape or shadows, apart."""
-        self._context.enable_only(moderngl.BLEND)
-        self._context.blend_func = moderngl.ONE, moderngl.ONE
+        hides = shadows is not None and are_worth_finding(self._plan, shadows, len(lights))
+        if shadows and hides:
+            self._hidden.see(shadows)
         maps = shadows.count.tolist() if shadows else [0] * len(lights)
         kinds = [
             (planned.groups, planned.light.shaping is not None, kind_of(count))
@@ -82,20 +85,30 @@ class LightTiles:
         for kind in dict.fromkeys(kinds):
             members = np.array([number for number, other in enumerate(kinds) if other == kind])
             variant = LightingVariant.of(self._plan, [lights[number] for number in members], kind[2])
-            array = self._array(variant, common_traits(records[members]))
-            targets.of(kind[0]).use()
-            atlas = shadows.bind(array.program) if shadows else None
-            gbuffer.bind(array.program, tile_runs=self._runs, shadow_atlas=atlas, ies_tables=tables.candela)
+            common = common_traits(records[members])
+            array = self._array(variant, common)
             for first in range(0, len(members), self._most):
-                self._draw(array, records[members[first : first + self._most]])
+                chosen = records[members[first : first + self._most]]
+                self._write(chosen)
+                seeks = shadows is not None and hides and bool(kind[2])
+                hidden = self._hidden.find(variant, common, len(chosen), shadows) if shadows and seeks else None
+                lists = list_lights(light_bounds(chosen, self._camera_from_relative), self._boxes, hidden)
+                targets.of(kind[0]).use()
+                atlas = shadows.bind(array.program) if shadows else None
+                gbuffer.bind(array.program, tile_runs=self._runs, shadow_atlas=atlas, ies_tables=tables.candela)
+                self._draw(array, lists)
 
-    def _draw(self, array: moderngl.VertexArray, records: NDArray[Any]) -> None:
-        lists = list_lights(light_bounds(records, self._camera_from_relative), self._boxes)
-        if not len(lists.lights):
-            return
+    def _write(self, records: NDArray[Any]) -> None:
+        """The lights' block."""
         block = np.zeros(self._most, records.dtype)
         block[: len(records)] = records
         self._block.write(block)
+
+    def _draw(self, array: moderngl.VertexArray, lists: LightLists) -> None:
+        if not len(lists.lights):
+            return
+        self._context.enable_only(moderngl.BLEND)
+        self._context.blend_func = moderngl.ONE, moderngl.ONE
         self._lists.write(lists.lights)
         self._runs.write(lists.runs)
         self._screen.cover(regions_of(lists.runs[..., 1] > 0, TILE, self._plan.size))

@@ -109,6 +109,11 @@ class LightingVariant:
         return [plane.define for plane in self.planes] + flags + output_defines(self.outputs)
 
     @property
+    def shadow_defines(self) -> list[str]:
+        """Those of a shader that looks at shadows alone."""
+        return ["SHADOWS"] + [f"SHADOW_{kind.upper()}S" for kind in self.shadows]
+
+    @property
     def generated(self) -> dict[str, str]:
         """What a shader that adds light to the targets includes."""
         return {

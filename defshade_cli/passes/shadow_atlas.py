@@ -68,15 +68,22 @@ def kind_of(maps: int) -> tuple[ShadowKind, ...]:
 class ShadowAtlas:
     """The maps of some lights. first, count: (L,) of each light, in the order they were given.
 
-    first_record: (L,) of those that have a single map.  records: of these.  uniforms: what the shaders read of cubes.
+    rows_used: of its texels.  first_record: (L,) of those that have a single map.  records: of these.
+    uniforms: what the shaders read of cubes.
     """
 
     depth: moderngl.Texture
     first: NDArray[np.uint32]
     count: NDArray[np.uint32]
+    rows_used: int
     first_record: NDArray[np.uint32]
     records: NDArray[Any]
     uniforms: Mapping[str, tuple[Any, ...]]
+
+    @property
+    def texels_used(self) -> int:
+        """Of all maps."""
+        return self.rows_used * ATLAS
 
     def bind(self, program: moderngl.Program) -> moderngl.Texture:
         """Let `program` find texels; returns what holds them."""

@@ -150,6 +150,7 @@ def shadow_atlas(target: MapTarget, request: MapRequest) -> ShadowAtlas:
         target.depth,
         first,
         count,
+        rows_used=-(-len(maps) // (ATLAS // side)) * side,
         first_record=(np.cumsum(count == 1) - 1).astype(np.uint32),
         records=map_records(maps, first[count == 1].tolist(), side),
         uniforms=cube_uniforms(maps[cubes[0]], side) if len(cubes) else {},

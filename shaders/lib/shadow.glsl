@@ -70,6 +70,33 @@ ShadowTexel shadow_texel(Light light, vec3 position) {
 const float STEP_OFFSET = 1.0 / 32.0, BEND_OFFSET = 0.5;
 const float STRAIGHT = 32.0;    // times that a surface bends less ahead than at a texel beside another
 
+// Depths at four texels that meet at a corner, as textureGather has them, and the steps to each from the one behind it and from it
+// to the one beside it, along rows and columns.
+struct Around {
+    vec4 z;
+    vec4 x0;
+    vec4 x1;
+    vec4 y0;
+    vec4 y1;
+};
+
+// `corner` in texels of the atlas.
+Around around(vec2 corner) {
+    vec2 low = (corner - 1.0) / ATLAS, high = (corner + 1.0) / ATLAS;
+    vec4 ll = textureGather(shadow_atlas, low, 0), hl = textureGather(shadow_atlas, vec2(high.x, low.y), 0);
+    vec4 lh = textureGather(shadow_atlas, vec2(low.x, high.y), 0), hh = textureGather(shadow_atlas, high, 0);
+    vec4 z = vec4(lh.z, hh.w, hl.x, ll.y);
+    return Around(z, z - vec4(lh.w, hh.z, hl.y, ll.x), z.yxwz - z, z - vec4(lh.y, hh.x, hl.w, ll.z), z.wzyx - z);
+}
+
+// At least, where the surfaces at those texels go on to in any look-up: casters_at below.
+vec4 least_around(Around texels) {
+    vec4 x_before = abs(texels.x0), x_after = abs(texels.x1), y_before = abs(texels.y0), y_after = abs(texels.y1);
+    vec4 fall = max(x_before, x_after) + max(y_before, y_after);
+    vec4 bends = min(x_before, x_after) + min(y_before, y_after);
+    return texels.z - (1.0 + STEP_OFFSET) * fall - BEND_OFFSET * bends;
+}
+
 struct Casters {
     vec4 stored;               // depths at the four texels around a receiver
     vec4 here;                 // where each one's surface goes on to at the receiver
@@ -96,12 +123,9 @@ Steps steps_of(vec4 behind, vec4 ahead, vec4 bend, vec4 bend_ahead) {
 // themselves or, offset, let light through where things touch.
 Casters casters_at(vec2 place) {
     vec2 corner = floor(place + 0.5), t = place + 0.5 - corner;
-    vec2 low = (corner - 1.0) / ATLAS, high = (corner + 1.0) / ATLAS;
-    vec4 ll = textureGather(shadow_atlas, low, 0), hl = textureGather(shadow_atlas, vec2(high.x, low.y), 0);
-    vec4 lh = textureGather(shadow_atlas, vec2(low.x, high.y), 0), hh = textureGather(shadow_atlas, high, 0);
-    vec4 z = vec4(lh.z, hh.w, hl.x, ll.y);
-    vec4 x0 = z - vec4(lh.w, hh.z, hl.y, ll.x), x1 = z.yxwz - z, x_bend = abs(x1 - x0);
-    vec4 y0 = z - vec4(lh.y, hh.x, hl.w, ll.z), y1 = z.wzyx - z, y_bend = abs(y1 - y0);
+    Around texels = around(corner);
+    vec4 z = texels.z, x0 = texels.x0, x1 = texels.x1, y0 = texels.y0, y1 = texels.y1;
+    vec4 x_bend = abs(x1 - x0), y_bend = abs(y1 - y0);
     Steps x = steps_of(x0, x1, x_bend, x_bend.yxwz), y = steps_of(y0, y1, y_bend, y_bend.wzyx);
     vec4 dx = vec4(t.x, 1.0 - t.x, 1.0 - t.x, t.x), dy = vec4(1.0 - t.y, 1.0 - t.y, t.y, t.y);
     vec4 aside = max(min(z + z.zwxy - z.yxwz - z.wzyx, -max(x.on, y.on)), 0.0);
