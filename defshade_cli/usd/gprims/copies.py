@@ -43,12 +43,11 @@ def once(display_color: NDArray[np.float32] | None = None, display_opacity: floa
     """A single copy, where the prim is. display_color: (3,)."""
     if display_color is None and display_opacity is None:
         return _ONCE
-    color, opacity = (np.nan if value is None else value for value in (display_color, display_opacity))
     return Copies(
-        np.eye(4)[None],
-        np.full(1, -1, np.int32),
-        np.full((1, 3), color, np.float32),
-        np.full(1, opacity, np.float32),
+        _ONCE.object_from_copy,
+        _ONCE.ids,
+        _ONCE.display_color if display_color is None else display_color[None],
+        _ONCE.display_opacity if display_opacity is None else np.array([display_opacity], np.float32),
     )
 
 
