@@ -41,10 +41,8 @@ if TYPE_CHECKING:
 
 
 class Asked(NamedTuple):
-    """A mesh, and what it says of itself."""
+    """What a mesh says of itself."""
 
-    prim: Usd.Prim
-    said: Said
     subsets: list[UsdGeom.Subset]
     told: Told
 
@@ -108,26 +106,31 @@ class Memory:
         self._surfaces[said.path] = time, surface
         return surface
 
+    def is_unknown_mesh(self, said: Said) -> bool:
+        """Is it one to be asked with others?"""
+        return said.type_name == "Mesh" and not self._extras.primvars and said.path not in self._surfaces
+
     def ask(self, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Asked | None:
-        """What a mesh says, to be looked into with others; None of one that is known, or to be read by itself."""
-        if said.type_name != "Mesh" or self._extras.primvars or said.path in self._surfaces:
-            return None
+        """What an unknown mesh says, to be looked into with others; None of one that is to be read by itself."""
         subsets = [] if said.is_leaf else material_subsets(prim)
         told = told_of(said, time, self._color_of(prim, said, subsets, time))
-        return told and Asked(prim, said, subsets, told)
+        return told and Asked(subsets, told)
 
-    def check(self, asked: Sequence[Asked]) -> list[Polygons | None]:
-        """Of each mesh what it says; None where some of it is not sound."""
-        return check_all([each.told for each in asked])
+    def check(self, asked: Sequence[Asked | Exception | None]) -> list[Polygons | None]:
+        """Of each mesh what it says; None where some of it is not sound, or needs to be looked into."""
+        checked = iter(check_all([each.told for each in asked if isinstance(each, Asked)]))
+        return [next(checked) if isinstance(each, Asked) else None for each in asked]
 
-    def surface_of(self, asked: Asked, polygons: Polygons | None, time: Usd.TimeCode) -> Surface:
-        """polygons: those of `check`."""
-        prim, said, subsets, _ = asked
-        if polygons is None:
+    def surface_of(
+        self, prim: Usd.Prim, said: Said, asked: Asked | None, polygons: Polygons | None, time: Usd.TimeCode
+    ) -> Surface:
+        """Of an unknown mesh. polygons: those of `check`."""
+        if asked is None or polygons is None:
             surface = self._read_surface(prim, time, said)
             assert surface is not None
         else:
-            surface = self._as_shown(surface_of(prim, said, time, Shape(polygons), self._shapes, subsets, []))
+            shape = Shape(polygons)
+            surface = self._as_shown(surface_of(prim, said, time, shape, self._shapes, asked.subsets, []))
         self._surfaces[said.path] = time, surface
         return surface
 

@@ -44,9 +44,11 @@ _PROTOTYPE_CHILDREN = Usd.PrimIsActive & Usd.PrimIsLoaded
 
 
 class _Awaited(NamedTuple):
-    """In place of a piece: a small mesh that is looked into with others. place: of what may be to say among issues."""
+    """In place of a piece: a mesh that is asked and looked into with others, after the walk, where what is done to each
+    has not to be fetched anew into the processor's caches. place: of what may be to say among issues."""
 
-    asked: Asked
+    prim: Usd.Prim
+    said: Said
     here: Standing
     place: int
 
@@ -208,9 +210,8 @@ class Traversal:
         return None if light is None else self._piece(prim, here, light)
 
     def _gprim(self, prim: Usd.Prim, here: Standing, said: Said) -> Piece | _Awaited | None:
-        asked = self._memory.ask(prim, self._time, said) if self._is_at_frame else None
-        if asked:
-            return _Awaited(asked, here, len(self.issues))
+        if self._is_at_frame and self._memory.is_unknown_mesh(said):
+            return _Awaited(prim, said, here, len(self.issues))
         surface = self._memory.surface_around(prim, self._time, self._base, said)
         if surface is None:
             self._report(prim, f"prims of type {prim.GetTypeName()} are not drawn")
@@ -234,25 +235,39 @@ class Traversal:
         awaited = [piece for piece in pieces if isinstance(piece, _Awaited)]
         if not awaited:
             return cast("list[Piece]", pieces)
-        checked = iter(self._memory.check([piece.asked for piece in awaited]))
+        asked = [self._ask(piece) for piece in awaited]
+        surfaces = zip(asked, self._memory.check(asked), strict=True)
         late: list[tuple[int, Unsupported]] = []
-        arrived = (self._arrive(p, next(checked), late) if isinstance(p, _Awaited) else p for p in pieces)
+        arrived = (self._arrive(p, *next(surfaces), late) if isinstance(p, _Awaited) else p for p in pieces)
         found = [piece for piece in arrived if piece]
         if late:
             said = merge(late, enumerate(self.issues), key=itemgetter(0))
             self.issues = dict.fromkeys(issue for _, issue in said)
         return found
 
+    def _ask(self, awaited: _Awaited) -> Asked | Exception | None:
+        """An error is for where the mesh arrives."""
+        try:
+            return self._memory.ask(awaited.prim, self._time, awaited.said)
+        except Exception as error:
+            return error
+
     def _arrive(
-        self, awaited: _Awaited, polygons: Polygons | None, late: list[tuple[int, Unsupported]]
+        self,
+        awaited: _Awaited,
+        asked: Asked | Exception | None,
+        polygons: Polygons | None,
+        late: list[tuple[int, Unsupported]],
     ) -> Piece | None:
         """late: takes what is to say of it, with the place among the issues that it would have had."""
-        asked, here, place = awaited
+        prim, said, here, place = awaited
         try:
-            piece, issues = self._standing_piece(asked.prim, here, self._memory.surface_of(asked, polygons, self._time))
+            if isinstance(asked, Exception):
+                raise asked
+            surface = self._memory.surface_of(prim, said, asked, polygons, self._time)
+            piece, issues = self._standing_piece(prim, here, surface)
         except Exception as error:  # a bug goes on as one
-            path = self._memory.shown(asked.prim.GetPath())
-            late.append((place, Unsupported(path, blamed(error, asked.prim))))
+            late.append((place, Unsupported(self._memory.shown(prim.GetPath()), blamed(error, prim))))
             return None
         late.extend([(place, issue) for issue in issues])
         return piece
