@@ -75,12 +75,17 @@ class RecordBuffer:
         bind(self._binding)
 
 
+CASTER_FRONTS = 0, 1, -1
+"""What DrawList.fronts may be."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawList:
     """All opaque geometry as one multi-draw.
 
     vertices: (buffer, format, attribute names) triples as moderngl takes them; indices: 32-bit.
     table: (C,) indirect commands, one draw a subset, instanced.  thin: (C,) whose materials may let something through.
+    fronts: (C,) of what is closed: 1 where fronts are counter-clockwise, −1 where its placements mirror them; else 0.
     corners: (C, 8, 3) of a box around what each command draws, relative to the eye; not finite where nothing is known.
     many_uvs: vertices hold UV_SETS sets of texture coordinates, not FEW_UV_SETS.
     """
@@ -89,6 +94,7 @@ class DrawList:
     indices: moderngl.Buffer
     table: NDArray[Any]
     thin: NDArray[np.bool_]
+    fronts: NDArray[np.int8]
     corners: NDArray[np.float64]
     color_varies: bool
     textures: TextureSet
@@ -101,6 +107,11 @@ class DrawList:
     def runs(self, seen: NDArray[np.bool_]) -> tuple[NDArray[Any], NDArray[Any]]:
         """Of the (C,) commands that are seen, the solid ones and the thin ones."""
         return self.table[seen & ~self.thin], self.table[seen & self.thin]
+
+    def caster_runs(self, seen: NDArray[np.bool_], clear: NDArray[np.bool_]) -> list[NDArray[Any]]:
+        """The same, those that are solid apart by CASTER_FRONTS. clear: (C,) from within which no light comes."""
+        fronts, solid = np.where(clear, self.fronts, 0), seen & ~self.thin
+        return [*(self.table[solid & (fronts == side)] for side in CASTER_FRONTS), self.table[seen & self.thin]]
 
     @property
     def texture_groups(self) -> int:
@@ -132,6 +143,7 @@ class GpuScene:
         primvars: tuple[str, ...] = (),
         texels: Mapping[Texture, float] = NO_TEXELS,
         thin: Sequence[int] = (),
+        closed: Sequence[int] = (),
     ) -> DrawList:
         """Make the scene's geometry, placements and materials resident, relative to its camera.
 
@@ -140,9 +152,11 @@ class GpuScene:
         primvars: names of those that layers show, at most MOST_PRIMVARS.
         texels: a side that textures are worth; those that it does not name are read whole.
         thin: numbers of the materials that may let something through.
+        closed: numbers of the drawables of which maps need the fronts alone.
         """
         layer_uv = "LAYER_UV" in inputs
-        self._instances.write(instance_records(scene.drawables, scene.camera.position))
+        instances = instance_records(scene.drawables, scene.camera.position)
+        self._instances.write(instances)
         names_read = uv_names(scene.drawables, scene.materials, len(scene.meshes))
         slots = uv_slots(names_read)
         uvs, uv_sets = tuple(in_slots(names, slots) for names in names_read), sets_of(slots)
@@ -179,6 +193,7 @@ class GpuScene:
             indices,
             commands,
             thin_commands,
+            fronts_of(scene.drawables, instances["handedness"], closed),
             corners,
             color_varies=color_varies,
             textures=textures,
@@ -264,6 +279,19 @@ def draw_commands(drawables: Sequence[Drawable], meshes: Sequence[Mesh]) -> tupl
             first_row += count
         first_instance += count
     return np.array(commands, _COMMAND), np.concatenate(rows) if rows else np.empty((0, 2), np.uint32)
+
+
+def fronts_of(
+    drawables: Sequence[Drawable], handedness: NDArray[np.float32], closed: Sequence[int]
+) -> NDArray[np.int8]:
+    """(C,) of each command, as DrawList.fronts; handedness: (P,) of all placements."""
+    fronts = np.zeros(len(drawables), np.int8)
+    ends = np.cumsum([0, *(len(drawable.world_from_object) for drawable in drawables)])
+    for number in closed:
+        sides = handedness[ends[number] : ends[number + 1]]
+        if len(sides) and (sides == sides[0]).all():
+            fronts[number] = sides[0]
+    return np.repeat(fronts, [len(drawable.subsets) for drawable in drawables])
 
 
 def command_corners(scene: Scene) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.targets import Part
+from defshade_cli.scene.camera import Camera
+from defshade_cli.spaces import transform_points
 
 _ROUNDING = 1e-5  # what float32 may move a corner, over the greatest coordinate
 
@@ -31,6 +34,17 @@ def may_see(clip_from_relative: NDArray[np.floating], corners: NDArray[np.float6
         slack = _ROUNDING * np.abs(clip).max(axis=(1, 2), keepdims=True)
         below, above = xyz < np.array([-1.0, -1.0, 0.0]) * w - slack, xyz > w + slack
     return ~(below.all(axis=1) | above.all(axis=1)).any(axis=1)
+
+
+def is_clear_of(camera: Camera, corners: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(C,) True for boxes (C, 8, 3) of which nothing lies between the eye and the near plane of its frustum."""
+    near = camera.clipping_range[0]
+    if camera.projection == "orthographic":
+        return np.asarray((-transform_points(camera.camera_from_world, corners)[..., 2] > near).all(axis=1))
+    left, right, bottom, top = camera.window
+    reach = near * math.hypot(1.0, max(-left, right), max(-bottom, top))
+    nearest = np.clip(camera.position, corners.min(axis=1), corners.max(axis=1))
+    return np.asarray(np.linalg.norm(nearest - camera.position, axis=1) > reach)
 
 
 def clip_of_part(clip_from_relative: NDArray[np.float32], part: Part) -> NDArray[np.floating]:
@@ -56,6 +70,10 @@ class CommandBuffer:
         self._breaks = _breaks(commands) if self._gpu.is_software else np.empty(0, np.int64)
         self._buffer.orphan(max(commands.nbytes, self._buffer.size))
         self._buffer.write(commands)
+
+    def is_empty(self, run: int) -> bool:
+        """Has a run no commands?"""
+        return bool(self._ends[run] == self._ends[run + 1])
 
     def render(self, array: moderngl.VertexArray, run: int) -> None:
         """Draw a run of those that were written."""

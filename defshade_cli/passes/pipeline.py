@@ -212,7 +212,7 @@ class Pipeline:
 
             self._motions.write(motion_records(scene, plan))
             moved = tuple(neighbouring_points(scene))
-        return self._scene.update(scene, plan.inputs, moved, plan.primvars, plan.texels, plan.thin)
+        return self._scene.update(scene, plan.inputs, moved, plan.primvars, plan.texels, plan.thin, plan.closed)
 
     def planes(self, scene: Scene, plan: Plan) -> Planes:
         """The float GBuffer at the pixels' centres: what the float64 reference is evaluated on."""
@@ -244,7 +244,7 @@ class Pipeline:
         for sample in samples(plan.samples, plan.filter, plan.filter_width, may_stop=plan.tracks_error):
             if moments and plan.moments and sample.index % plan.samples_a_moment == 0:
                 scene, plan = next(moments)
-                draws = self._scene.update(scene, plan.inputs, texels=plan.texels, thin=plan.thin)
+                draws = self._scene.update(scene, plan.inputs, texels=plan.texels, thin=plan.thin, closed=plan.closed)
                 tables = self._tables.update(plan)
                 mattes.see(scene)
                 if canvas.rays:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -16,10 +17,10 @@ from numpy.typing import NDArray
 from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.render_space import space_defines
-from defshade_cli.gpu.residence import SHADOW_BLOCK, DrawList, RecordBuffer
+from defshade_cli.gpu.residence import CASTER_FRONTS, SHADOW_BLOCK, DrawList, RecordBuffer
 from defshade_cli.gpu.textures import textures_source
 from defshade_cli.image.render_space import REC709, RenderSpace
-from defshade_cli.passes.culling import CommandBuffer, may_see
+from defshade_cli.passes.culling import CommandBuffer, is_clear_of, may_see
 from defshade_cli.passes.shadow_atlas import ShadowAtlas, places_from_relative
 from defshade_cli.passes.shadow_changes import MapChange, Region, map_change, window_of
 from defshade_cli.passes.shadow_maps import MapRequest, Maps, MapTarget, shadow_atlas
@@ -70,10 +71,12 @@ class ShadowPass:
         generated = {"generated/textures.glsl": textures_source(variant.texture_groups)}
         self._context = gpu.context
         kinds = [replace(variant, cutout=False), variant][: 1 + variant.cutout]
-        self._programs = [
+        programs = [
             gpu.shaders.program("shadow.vert", "shadow.frag", defines=kind.defines, generated=generated)
             for kind in kinds
         ]
+        solid, *thin = programs
+        self._turns = [(solid, fronts) for fronts in CASTER_FRONTS] + [(program, 0) for program in thin]
         self._targets = cache(lambda number: MapTarget(gpu))
         self._records = RecordBuffer(gpu, SHADOW_BLOCK, uniform=True)
         self._commands = CommandBuffer(gpu)
@@ -116,27 +119,42 @@ class ShadowPass:
 
     def _draw_maps(self, draws: DrawList, target: MapTarget, maps: Maps, parts: Mapping[int, Region | None]) -> None:
         """Parts of maps, or all of them, with the commands that they may see, those first that let nothing through."""
-        kinds = len(self._programs)
-        seen = [may_see(maps.clip_of(slot, part), draws.corners) for slot, part in parts.items()]
-        if not seen:
+        if not parts:
             return
-        self._commands.write([run for each in seen for run in draws.runs(each)[:kinds]])
-        self._context.enable_only(moderngl.DEPTH_TEST)
+        runs = [self._runs(draws, maps, slot, part) for slot, part in parts.items()]
+        self._commands.write([run for each in runs for run in each])
         self._context.depth_func = ">"
         self._context.polygon_offset = _DEPTH_OFFSET
-        for kind, program in enumerate(self._programs):
+        for turn, (program, fronts) in enumerate(self._turns):
+            self._show(fronts)
             array = self._context.vertex_array(program, draws.vertices_of(program), draws.indices)
             for number, (slot, part) in enumerate(parts.items()):
-                target.keep_to(slot, part)
-                program["clip_from_relative"] = tuple(maps.clips[slot].ravel().tolist())
-                if "towards_light" in program:
-                    program["towards_light"] = _towards(maps.cameras[slot])
-                if "first_caster" in program:
-                    program["first_caster"] = int(maps.casters[slot])
-                self._commands.render(array, number * kinds + kind)
+                run = number * len(self._turns) + turn
+                if not self._commands.is_empty(run):
+                    target.keep_to(slot, part)
+                    _set_map(program, maps, slot)
+                    self._commands.render(array, run)
             array.release()
         target.keep_to(0, None)
         self._context.polygon_offset = 0.0, 0.0
+
+    def _runs(self, draws: DrawList, maps: Maps, slot: int, part: Region | None) -> list[NDArray[Any]]:
+        """What a map, or a part of it, may see in each turn."""
+        seen, clear = may_see(maps.clip_of(slot, part), draws.corners), is_clear_of(maps.cameras[slot], draws.corners)
+        return draws.caster_runs(seen, clear)[: len(self._turns)]
+
+    def _show(self, fronts: int) -> None:
+        """Both sides of all faces, or those alone that are fronts: see DrawList.fronts."""
+        self._context.enable_only(moderngl.DEPTH_TEST | (moderngl.CULL_FACE if fronts else moderngl.NOTHING))
+        self._context.cull_face = "front" if fronts < 0 else "back"
+
+
+def _set_map(program: moderngl.Program, maps: Maps, slot: int) -> None:
+    program["clip_from_relative"] = tuple(maps.clips[slot].ravel().tolist())
+    if "towards_light" in program:
+        program["towards_light"] = _towards(maps.cameras[slot])
+    if "first_caster" in program:
+        program["first_caster"] = int(maps.casters[slot])
 
 
 def _towards(camera: Camera) -> tuple[float, ...]:

@@ -42,6 +42,8 @@ def explain(plan: Plan) -> Iterator[Decision]:
     plain = "one sample of lights that are points"
     yield _kept("blur of highlights", plan.cell_parts > 0, "over what a sample stands for", plain)
     yield _explain_shadows(plan)
+    if plan.shadows:
+        yield _explain_backs(plan)
     yield _kept("IES profiles", bool(plan.profiles), "a light is shaped by one", "no light has one")
     yield _kept("shadow linking", plan.shadow_linked, "a light chooses its casters", "everything casts shadows")
     yield _kept("environment", bool(plan.domes), "a dome lights the scene", "no dome")
@@ -71,6 +73,12 @@ def _explain_shadows(plan: Plan) -> Decision:
         return Decision("shadow maps", "skipped", "no light casts any, or none were asked")
     side = plan.shadow_resolution
     return Decision("shadow maps", f"{side} x {side}", f"{plan.maps_a_sample} a sample at most")
+
+
+def _explain_backs(plan: Plan) -> Decision:
+    if not plan.closed:
+        return Decision("backs of casters", "drawn", "no large closed mesh, or few maps")
+    return Decision("backs of casters", f"skipped of {len(plan.closed)}", "closed meshes, whose fronts shade alike")
 
 
 def _explain_rays(plan: Plan) -> Decision:

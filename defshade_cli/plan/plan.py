@@ -16,6 +16,7 @@ from defshade_cli.gpu.planes import MOST_PRIMVARS, MOST_TARGETS, Plane, named_pl
 from defshade_cli.image.layers import BEAUTY, LAYERS, PRIMVAR_FAMILY, resolve
 from defshade_cli.image.ocio import find_render_space
 from defshade_cli.image.render_space import RenderSpace
+from defshade_cli.plan.closed_casters import closed_casters
 from defshade_cli.plan.cost import choose_lighting
 from defshade_cli.plan.decisions import Decision, explain
 from defshade_cli.plan.groups import light_groups, light_outputs
@@ -65,6 +66,7 @@ class Plan:
     roughest_rays: roughness of surfaces from which on they see none so.
     background: domes are seen where no geometry is.
     thin: numbers of the materials whose opacity may be below 1.  transparent: it scales the diffuse of some alone.
+    closed: numbers of the drawables that show shadow maps their fronts alone.
     solid: how many have opacity from an image that is 1 where they read it, see plan/solidity.py.
     texels: of each texture that is read, a side that it is worth, see plan/texels.py.
     data_pass: data layers need an unjittered float GBuffer of their own.
@@ -102,6 +104,7 @@ class Plan:
     roughest_rays: float
     background: bool
     thin: tuple[int, ...]
+    closed: tuple[int, ...]
     solid: int
     transparent: bool
     texels: Mapping[Texture, float]
@@ -268,6 +271,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     lights = _seen_lights(plan_lights(scene, exposure, settings, layers), layers)
     solid = solid_materials(scene)
     thin = thin_materials(scene, solid)
+    thin_ones = thin_numbers(scene, thin)
     if _has_light(layers):
         lights = seen_by_rays(lights, scene, settings, thin=bool(thin))
     planes, data_planes, data_pass = _divide_planes(scene, settings, layers, thin)
@@ -299,7 +303,8 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         lobe_rays=rays_a_sample(settings) if any(planned.by_rays for planned in lights) else 0,
         roughest_rays=roughest_rays(lights, scene),
         background=settings.background,
-        thin=thin_numbers(scene, thin),
+        thin=thin_ones,
+        closed=closed_casters(scene, lights, settings.most_samples, thin_ones) if shadows else (),
         solid=len(solid),
         transparent=is_transparent(thin, settings.shading),
         texels=seen_texels(scene, View(display_camera, display[1])),

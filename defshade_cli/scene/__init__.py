@@ -10,6 +10,7 @@ Light is looked up and sampled by
     emission, distribution   the points of a light in one sample
     environment, radiance_map, mesh_light, ies   skies, images, meshes and profiles that shine
     lamp, triangle_tree      shapes and triangles as a ray meets them
+    closed                   meshes that light leaves as it enters them
 
 and `arrays` checks what all of them hold.
 """

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.arrays import frozen
+from defshade_cli.scene.closed import is_closed
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +74,11 @@ class Mesh:
         """Of a ball around the drawn points, whose middle is that of `bounds`."""
         apart = self.points[self.triangles.ravel()].astype(np.float64) - self.bounds.mean(axis=0)
         return float(np.nanmax(np.linalg.norm(apart[np.isfinite(apart).all(axis=1)], axis=1), initial=0.0))
+
+    @cached_property
+    def is_closed(self) -> bool:
+        """Does what enters it leave it?"""
+        return is_closed(self.points, self.triangles)
 
 
 _CORNERS = np.array(list(product((0, 1), repeat=3)))
