@@ -2,7 +2,7 @@
 #include "lib/shadow.glsl"
 #include "generated/lights.glsl"
 
-uniform sampler2D low;             // of each cell: tile_bounds.frag
+uniform sampler2D low;             // of each tile: tile_bounds.frag
 uniform sampler2D high;
 uniform sampler2D low_normal;
 uniform sampler2D high_normal;
@@ -10,7 +10,7 @@ uniform sampler2D least_depths;    // of blocks of the shadow atlas: least_depth
 uniform int first_light;
 uniform int end_light;
 
-out uint hidden;                   // of a cell, a bit for each light from the first on: does none of its light arrive there?
+out uint hidden;                   // of a tile, a bit for each light from the first on: does none of its light arrive there?
 
 const int MOST_BLOCKS = 24;        // a side; what covers more of a map is seldom hidden in all of it
 const float NEARER = 1e-4;         // what float32 may move a receiver, of its depth, and texels
@@ -50,7 +50,7 @@ bool is_hidden(Light light, vec3 corners[8]) {
     return behind;
 }
 
-// Is the light behind all surfaces of a cell? Each pair of a normal and a direction to the light lies between their bounds.
+// Is the light behind all surfaces of a tile? Each pair of a normal and a direction to the light lies between their bounds.
 bool is_behind(Light light, vec3 least, vec3 most, vec3 least_normal, vec3 most_normal) {
     vec3 place = light.is_whole != 0u ? light.centre : light.position;
     vec3 nearest = is_distant(light) ? -light.axis : place - most, farthest = is_distant(light) ? -light.axis : place - least;
@@ -59,19 +59,18 @@ bool is_behind(Light light, vec3 least, vec3 most, vec3 least_normal, vec3 most_
     return products.x + products.y + products.z < -1e-5 * away;
 }
 
-// A pixel a cell.
+// A pixel a tile.
 void main() {
-    ivec2 cell = ivec2(gl_FragCoord.xy);
-    vec3 least = texelFetch(low, cell, 0).xyz, most = texelFetch(high, cell, 0).xyz;
-    vec3 least_normal = texelFetch(low_normal, cell, 0).xyz, most_normal = texelFetch(high_normal, cell, 0).xyz;
+    ivec2 tile = ivec2(gl_FragCoord.xy);
+    vec3 least = texelFetch(low, tile, 0).xyz, most = texelFetch(high, tile, 0).xyz;
+    vec3 least_normal = texelFetch(low_normal, tile, 0).xyz, most_normal = texelFetch(high_normal, tile, 0).xyz;
     vec3 slack = vec3(1e-6 * max(length(least), length(most)));
     vec3 corners[8];
     for (int i = 0; i < 8; ++i) {
         corners[i] = mix(least - slack, most + slack, bvec3((i & 1) != 0, (i & 2) != 0, (i & 4) != 0));
     }
-    hidden = ~0u;                  // what shows nothing is dark
-    if (least.x > most.x) return;
     hidden = 0u;
+    if (least.x > most.x) return;
     for (int i = first_light; i < end_light; ++i) {
         Light light = light_of(uint(i));
         bool none = is_behind(light, least, most, least_normal, most_normal) || is_hidden(light, corners);

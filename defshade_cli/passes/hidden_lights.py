@@ -32,15 +32,10 @@ from defshade_cli.settings import Layout
 _BLOCK = 4
 """Texels a side, a divisor of a map's."""
 
-_CELL = 16
-"""Pixels a side of what is looked at alone: a tile is dark where all in it is."""
-
-_ACROSS = TILE // _CELL
-
 _BITS = 32
 """Lights at a time."""
 
-_WORTHWHILE = 1.0
+_WORTHWHILE = 0.25
 """Lights of all pixels, for each texel of their maps: for fewer it takes longer to look than to light."""
 
 
@@ -61,8 +56,7 @@ class HiddenLights:
 
     def begin(self, gbuffer: GBuffer, plan: Plan) -> None:
         """With what a sample shows, whose View is bound."""
-        columns, rows = tile_grid(plan.size)
-        self._gbuffer, self._cells = gbuffer, (columns * _ACROSS, rows * _ACROSS)
+        self._gbuffer, self._tiles = gbuffer, tile_grid(plan.size)
         self._bounds = cache(lambda: self._find_bounds(plan))
 
     def see(self, atlas: ShadowAtlas) -> None:
@@ -76,22 +70,21 @@ class HiddenLights:
     def find(self, variant: LightingVariant, common: Traits, count: int, atlas: ShadowAtlas) -> NDArray[np.bool_]:
         """(rows, columns, L): does nothing of a light arrive in a tile? Of those in the block, which are `count`."""
         array, bounds = self._array(variant, common), self._bounds().textures
-        target = self._frame.of_tiles("hidden", 1, self._cells, "u4")
+        target = self._frame.of_tiles("hidden", 1, self._tiles, "u4")
         target.framebuffer.use()
         maps = atlas.bind(array.program)
         _bind(array.program, {**bounds, "shadow_atlas": maps, "least_depths": self._least.textures["least"]})
-        found, (columns, rows) = [], (side // _ACROSS for side in self._cells)
+        found = []
         for first in range(0, count, _BITS):
             end = min(first + _BITS, count)
             set_uniforms(array.program, {"first_light": first, "end_light": end})
             self._draw(array, WHOLE)
-            bits = target.read("hidden").reshape(rows, _ACROSS, columns, _ACROSS, 1)
-            found.append(np.bitwise_and.reduce(bits, axis=(1, 3)) >> np.arange(end - first, dtype=np.uint32) & 1)
+            found.append(target.read("hidden") >> np.arange(end - first, dtype=np.uint32) & 1)
         return np.concatenate(found, axis=2) > 0
 
     def _find_bounds(self, plan: Plan) -> Target:
         """Of what the tiles show."""
-        target = self._frame.of_tiles("low high low_normal high_normal", 4, self._cells)
+        target = self._frame.of_tiles("low high low_normal high_normal", 4, self._tiles)
         target.framebuffer.use()
         array = self._tile_bounds(self._gbuffer.planes, plan.layout, plan.camera.projection == "orthographic")
         self._gbuffer.bind(array.program)
@@ -127,5 +120,5 @@ def _compile(gpu: Gpu, variant: LightingVariant, common: Traits, most: int) -> m
 
 def _bounds_program(gpu: Gpu, planes: tuple[Plane, ...], layout: Layout, orthographic: bool) -> moderngl.Program:
     generated = {"generated/planes.glsl": read_source(planes, layout)}
-    defines = [plane.define for plane in planes] + [f"LIGHT_TILE {_CELL}"] + ["ORTHOGRAPHIC"] * orthographic
+    defines = [plane.define for plane in planes] + [f"LIGHT_TILE {TILE}"] + ["ORTHOGRAPHIC"] * orthographic
     return gpu.shaders.program("screen.vert", "tile_bounds.frag", defines=defines, generated=generated)

@@ -13,7 +13,7 @@ from defshade_cli.dataclass import dataclass
 from defshade_cli.plan.bounds import ROUNDING, LightBounds
 from defshade_cli.spaces import Window
 
-TILE = 32
+TILE = 16
 """Pixels a side."""
 
 _BLOCK = 8
