@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from pxr import Sdf, Usd, UsdGeom
 
@@ -39,12 +39,21 @@ from defshade_cli.usd.surfaces.geometry import (
 if TYPE_CHECKING:
     from defshade_cli.usd.skel import Rigs
 
+T = TypeVar("T")
+
 
 class Asked(NamedTuple):
     """What a mesh says of itself."""
 
     subsets: list[UsdGeom.Subset]
     told: Told
+
+
+def _tried(step: Callable[..., T], *arguments: Any) -> T | Exception:
+    try:
+        return step(*arguments)
+    except Exception as error:  # for where it can be said of what
+        return error
 
 
 class Memory:
@@ -110,21 +119,38 @@ class Memory:
         """Is it one to be asked with others?"""
         return said.type_name == "Mesh" and not self._extras.primvars and said.path not in self._surfaces
 
-    def ask(self, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Asked | None:
+    def new_surfaces(
+        self, prims: Sequence[Usd.Prim], saids: Sequence[Said], time: Usd.TimeCode
+    ) -> list[Surface | Exception]:
+        """Of unknown meshes, or what went wrong.
+
+        They are asked one after the other, with nothing between: the processor keeps what it does to each.
+        """
+        asked = [_tried(self._ask, prim, said, time) for prim, said in zip(prims, saids, strict=True)]
+        checked = iter(check_all([each.told for each in asked if isinstance(each, Asked)]))
+        found = [(each, next(checked) if isinstance(each, Asked) else None) for each in asked]
+        return [
+            _tried(self._new_surface, prim, said, *each, time)
+            for prim, said, each in zip(prims, saids, found, strict=True)
+        ]
+
+    def _ask(self, prim: Usd.Prim, said: Said, time: Usd.TimeCode) -> Asked | None:
         """What an unknown mesh says, to be looked into with others; None of one that is to be read by itself."""
         subsets = [] if said.is_leaf else material_subsets(prim)
         told = told_of(said, time, self._color_of(prim, said, subsets, time))
         return told and Asked(subsets, told)
 
-    def check(self, asked: Sequence[Asked | Exception | None]) -> list[Polygons | None]:
-        """Of each mesh what it says; None where some of it is not sound, or needs to be looked into."""
-        checked = iter(check_all([each.told for each in asked if isinstance(each, Asked)]))
-        return [next(checked) if isinstance(each, Asked) else None for each in asked]
-
-    def surface_of(
-        self, prim: Usd.Prim, said: Said, asked: Asked | None, polygons: Polygons | None, time: Usd.TimeCode
+    def _new_surface(
+        self,
+        prim: Usd.Prim,
+        said: Said,
+        asked: Asked | Exception | None,
+        polygons: Polygons | None,
+        time: Usd.TimeCode,
     ) -> Surface:
-        """Of an unknown mesh. polygons: those of `check`."""
+        """polygons: as checked, None of what is not sound."""
+        if isinstance(asked, Exception):
+            raise asked
         if asked is None or polygons is None:
             surface = self._read_surface(prim, time, said)
             assert surface is not None

@@ -24,9 +24,8 @@ from defshade_cli.usd.kind import Kind, Nature
 from defshade_cli.usd.lights.light import is_light, read_light
 from defshade_cli.usd.lights.mesh_light import Glow
 from defshade_cli.usd.materials.binding import Bindings, bound_to
-from defshade_cli.usd.memory import Asked, Memory
+from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.models.draw_mode import FULL, handed_down, mode_above, takes_effect
-from defshade_cli.usd.polygons.polygons import Polygons
 from defshade_cli.usd.render_settings.render_pass import PassRules
 from defshade_cli.usd.said import Inherited, Said, said_of
 from defshade_cli.usd.surfaces.geometry import Surface, is_time_varying
@@ -44,8 +43,7 @@ _PROTOTYPE_CHILDREN = Usd.PrimIsActive & Usd.PrimIsLoaded
 
 
 class _Awaited(NamedTuple):
-    """In place of a piece: a mesh that is asked and looked into with others, after the walk, where what is done to each
-    has not to be fetched anew into the processor's caches. place: of what may be to say among issues."""
+    """In place of a piece: a mesh that is looked into with others. place: of what may be to say among issues."""
 
     prim: Usd.Prim
     said: Said
@@ -235,36 +233,24 @@ class Traversal:
         awaited = [piece for piece in pieces if isinstance(piece, _Awaited)]
         if not awaited:
             return cast("list[Piece]", pieces)
-        asked = [self._ask(piece) for piece in awaited]
-        surfaces = zip(asked, self._memory.check(asked), strict=True)
+        prims, saids = [piece.prim for piece in awaited], [piece.said for piece in awaited]
+        surfaces = iter(self._memory.new_surfaces(prims, saids, self._time))
         late: list[tuple[int, Unsupported]] = []
-        arrived = (self._arrive(p, *next(surfaces), late) if isinstance(p, _Awaited) else p for p in pieces)
+        arrived = (self._arrive(p, next(surfaces), late) if isinstance(p, _Awaited) else p for p in pieces)
         found = [piece for piece in arrived if piece]
         if late:
             said = merge(late, enumerate(self.issues), key=itemgetter(0))
             self.issues = dict.fromkeys(issue for _, issue in said)
         return found
 
-    def _ask(self, awaited: _Awaited) -> Asked | Exception | None:
-        """An error is for where the mesh arrives."""
-        try:
-            return self._memory.ask(awaited.prim, self._time, awaited.said)
-        except Exception as error:
-            return error
-
     def _arrive(
-        self,
-        awaited: _Awaited,
-        asked: Asked | Exception | None,
-        polygons: Polygons | None,
-        late: list[tuple[int, Unsupported]],
+        self, awaited: _Awaited, surface: Surface | Exception, late: list[tuple[int, Unsupported]]
     ) -> Piece | None:
         """late: takes what is to say of it, with the place among the issues that it would have had."""
-        prim, said, here, place = awaited
+        prim, _, here, place = awaited
         try:
-            if isinstance(asked, Exception):
-                raise asked
-            surface = self._memory.surface_of(prim, said, asked, polygons, self._time)
+            if isinstance(surface, Exception):
+                raise surface
             piece, issues = self._standing_piece(prim, here, surface)
         except Exception as error:  # a bug goes on as one
             late.append((place, Unsupported(self._memory.shown(prim.GetPath()), blamed(error, prim))))
