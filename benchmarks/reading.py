@@ -99,6 +99,18 @@ def divided(count: int) -> Usd.Stage:
     return stage
 
 
+def with_hexagons(count: int) -> Usd.Stage:
+    """Dressed meshes of which two faces are one."""
+    stage = dressed(count)
+    for prim in _meshes_of(stage):
+        mesh = UsdGeom.Mesh(prim)
+        mesh.GetFaceVertexCountsAttr().Set([6, 4, 4])
+        mesh.GetFaceVertexIndicesAttr().Set([0, 1, 2, 5, 4, 3, 3, 4, 7, 6, 4, 5, 8, 7])
+        uvs = prim.GetAttribute("primvars:st")
+        uvs.Set(Vt.Vec2fArray.FromNumpy(np.array(uvs.Get())[:14]))
+    return stage
+
+
 def holed(count: int) -> Usd.Stage:
     """Dressed meshes of which a face is a hole."""
     stage = dressed(count)
@@ -142,6 +154,7 @@ GENERATED: Stages = {
     "2,000 of 8, dressed": lambda: dressed(2000),
     "2,000 of them that inherit a colour": lambda: inheriting(2000),
     "2,000 in two subsets each": lambda: divided(2000),
+    "2,000 with a hexagon": lambda: with_hexagons(2000),
     "2,000 with holes": lambda: holed(2000),
     "2,000 with coordinates in doubles": lambda: in_doubles(2000),
     "2,000 with a broken face": lambda: broken(2000),
