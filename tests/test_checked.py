@@ -11,7 +11,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Complexity
-from defshade_cli.usd.memory import Memory
+from defshade_cli.usd import memory
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.surfaces import tessellation
 
@@ -151,7 +151,7 @@ def said(scene: Scene) -> list[object]:
 
 
 def alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Memory, "ask", lambda *_: None)
+    monkeypatch.setattr(memory, "told_of", lambda *_: None)
     monkeypatch.setattr(tessellation, "shape_all", lambda _: {})
     monkeypatch.setattr(tessellation, "_refined", lambda _: {})
 
