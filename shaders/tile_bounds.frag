@@ -8,12 +8,9 @@ layout(location = 1) out vec4 high;
 layout(location = 2) out vec4 low_normal;
 layout(location = 3) out vec4 high_normal;
 
-const int TILE = LIGHT_TILE;
-
 // A pixel a tile.
 void main() {
-    ivec2 first = ivec2(gl_FragCoord.xy) * TILE;
-    ivec2 last = min(first + TILE, ivec2(view.size));
+    ivec2 first = ivec2(gl_FragCoord.xy) * LIGHT_TILE, last = min(first + LIGHT_TILE, ivec2(view.size));
     vec3 least = vec3(1.0e38), most = -least, least_normal = least, most_normal = most;
     for (int y = first.y; y < last.y; ++y) {
         for (int x = first.x; x < last.x; ++x) {

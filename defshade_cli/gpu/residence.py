@@ -108,9 +108,9 @@ class DrawList:
         """Of the (C,) commands that are seen, the solid ones and the thin ones."""
         return self.table[seen & ~self.thin], self.table[seen & self.thin]
 
-    def caster_runs(self, seen: NDArray[np.bool_], clear: NDArray[np.bool_]) -> list[NDArray[Any]]:
-        """The same, those that are solid apart by CASTER_FRONTS. clear: (C,) from within which no light comes."""
-        fronts, solid = np.where(clear, self.fronts, 0), seen & ~self.thin
+    def caster_runs(self, seen: NDArray[np.bool_], fronts: NDArray[np.int8]) -> list[NDArray[Any]]:
+        """The same, those that are solid apart by CASTER_FRONTS. fronts: (C,), 0 too where a light may be within."""
+        solid = seen & ~self.thin
         return [*(self.table[solid & (fronts == side)] for side in CASTER_FRONTS), self.table[seen & self.thin]]
 
     @property

@@ -23,6 +23,8 @@ _INCLUDE = re.compile(r'^[ \t]*#include[ \t]+"([^"]+)"[ \t]*\n', re.MULTILINE)
 _LOCATION = re.compile(r"\b\d+(?::(\d+)(?:\(\d+\))?|\((\d+)\))\s*:")  # Mesa "0:12(3):", NVIDIA "0(12) :"
 _STAGES = {"vert": "vertex_shader", "frag": "fragment_shader"}
 
+Texture = moderngl.Texture | moderngl.TextureArray | moderngl.Texture3D
+
 Generated = Mapping[str, str] | None
 
 
@@ -144,6 +146,14 @@ def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> Non
     for name, value in values.items():
         if name in program:
             program[name] = value
+
+
+def set_textures(program: moderngl.Program, textures: Mapping[str, Texture | None]) -> None:
+    """Those that the program reads, by the names of their samplers."""
+    for unit, (name, texture) in enumerate(textures.items()):
+        if texture and name in program:
+            texture.use(unit)
+            program[name] = unit
 
 
 def set_uniform_bytes(program: moderngl.Program, name: str, values: bytes) -> None:

@@ -13,7 +13,7 @@ from defshade_cli.gpu.planes import read_source
 from defshade_cli.gpu.shaders import set_uniform_bytes
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer
-from defshade_cli.passes.light_lists import TILE
+from defshade_cli.passes.light_lists import TILE, tile_grid
 from defshade_cli.passes.screen import Screen, regions_of
 from defshade_cli.passes.shadow_changes import MapChange
 from defshade_cli.settings import Layout
@@ -28,14 +28,9 @@ _WIDTH = 256
 """Blocks in a row of their texture."""
 
 
-def part_grid(size: tuple[int, int]) -> tuple[int, int]:
-    """(columns, rows) of the parts of an image of (width, height)."""
-    return -(-size[0] // PART), -(-size[1] // PART)
-
-
 def parts_of(tiles: NDArray[np.bool_], size: tuple[int, int]) -> NDArray[np.bool_]:
     """Those of tiles (R, C), of an image of (width, height)."""
-    columns, rows = part_grid(size)
+    columns, rows = tile_grid(size, PART)
     times = TILE // PART
     return tiles.repeat(times, axis=0).repeat(times, axis=1)[:rows, :columns]
 
@@ -60,7 +55,7 @@ class ChangedPartsPass:
         gbuffer: the View that it was drawn by is bound.
         """
         size = gbuffer.target.framebuffer.size
-        columns, rows = part_grid(size)
+        columns, rows = tile_grid(size, PART)
         target = frame.of_tiles("changed", 1, (columns, rows))
         target.framebuffer.use()
         target.framebuffer.clear()

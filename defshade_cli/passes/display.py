@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.shaders import set_uniforms
+from defshade_cli.gpu.shaders import set_textures, set_uniforms
 from defshade_cli.gpu.targets import allocate
 from defshade_cli.image.colour import BRIGHTEST, Pixels
 from defshade_cli.image.display_table import CELLS, MOST, TOE, Lattice
@@ -121,9 +121,7 @@ class _Shader:
         self._context.enable_only(moderngl.DEPTH_TEST if depth else moderngl.NOTHING)
         if depth:
             self._context.depth_func = depth
-        for unit, (name, texture) in enumerate(self._tables.items()):
-            texture.use(unit)
-            self._program[name] = unit
+        set_textures(self._program, self._tables)
         image.bind_to_image(0, read=True, write=False)
         if self._lattice:
             self._lattice.bind_to_image(1, read=True, write=False)

@@ -13,6 +13,7 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import Plane, integer_attachments, planes_read, uses_standard_depth, write_source
 from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.residence import DrawList
+from defshade_cli.gpu.shaders import set_textures
 from defshade_cli.gpu.targets import NOWHERE, Part, Target, allocate
 from defshade_cli.gpu.textures import textures_source
 from defshade_cli.image.render_space import REC709, RenderSpace
@@ -35,10 +36,7 @@ class GBuffer:
         """Let `program` read the planes, and `others` by the names of their samplers, where it has those."""
         for unit, plane in enumerate(planes_read(self.planes, self.layout)):
             self.target.textures[plane.name].bind_to_image(unit, read=True, write=False)
-        for unit, (name, texture) in enumerate({"plane_depth": self.target.depth, **others}.items()):
-            if texture and name in program:
-                texture.use(unit)
-                program[name] = unit
+        set_textures(program, {"plane_depth": self.target.depth, **others})
 
 
 def make_gbuffer(gpu: Gpu, size: tuple[int, int], planes: tuple[Plane, ...], layout: Layout) -> GBuffer:

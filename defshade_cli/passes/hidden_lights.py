@@ -7,7 +7,6 @@ may be turned away.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cache
 
 import moderngl
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import Plane, read_source
-from defshade_cli.gpu.shaders import set_uniforms
+from defshade_cli.gpu.shaders import set_textures, set_uniforms
 from defshade_cli.gpu.targets import Target
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer
@@ -64,7 +63,7 @@ class HiddenLights:
         side, array = ATLAS // _BLOCK, self._blocks()
         self._least = self._frame.of_tiles("least", 1, (side, side))
         self._least.framebuffer.use()
-        _bind(array.program, {"shadow_atlas": atlas.depth})
+        set_textures(array.program, {"shadow_atlas": atlas.depth})
         self._draw(array, np.array([[0.0, 0.0, 1.0, atlas.rows_used / ATLAS]], np.float32))
 
     def find(self, variant: LightingVariant, common: Traits, count: int, atlas: ShadowAtlas) -> NDArray[np.bool_]:
@@ -73,7 +72,7 @@ class HiddenLights:
         target = self._frame.of_tiles("hidden", 1, self._tiles, "u4")
         target.framebuffer.use()
         maps = atlas.bind(array.program)
-        _bind(array.program, {**bounds, "shadow_atlas": maps, "least_depths": self._least.textures["least"]})
+        set_textures(array.program, {**bounds, "shadow_atlas": maps, "least_depths": self._least.textures["least"]})
         found = []
         for first in range(0, count, _BITS):
             end = min(first + _BITS, count)
@@ -95,14 +94,6 @@ class HiddenLights:
         self._context.enable_only(moderngl.NOTHING)
         self._screen.cover(regions)
         self._screen.draw(array)
-
-
-def _bind(program: moderngl.Program, textures: Mapping[str, moderngl.Texture]) -> None:
-    """Those that the program reads."""
-    for unit, (name, texture) in enumerate(textures.items()):
-        if name in program:
-            texture.use(unit)
-            program[name] = unit
 
 
 def are_worth_finding(plan: Plan, atlas: ShadowAtlas, lights: int) -> bool:

@@ -19,9 +19,9 @@ TILE = 16
 _BLOCK = 8
 
 
-def tile_grid(size: tuple[int, int]) -> tuple[int, int]:
-    """(columns, rows) of the tiles of an image of (width, height)."""
-    return -(-size[0] // TILE), -(-size[1] // TILE)
+def tile_grid(size: tuple[int, int], side: int = TILE) -> tuple[int, int]:
+    """(columns, rows) of the tiles of an image of (width, height), or of others that are so many pixels a side."""
+    return -(-size[0] // side), -(-size[1] // side)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -74,9 +74,9 @@ class LightTiles:
         tables: LightTables = NO_TABLES,
     ) -> None:
         """All `lights`, records (L,), on top of the targets; those that cost more, for shape or shadows, apart."""
-        hides = shadows is not None and are_worth_finding(self._plan, shadows, len(lights))
-        if shadows and hides:
-            self._hidden.see(shadows)
+        hiding = shadows if shadows and are_worth_finding(self._plan, shadows, len(lights)) else None
+        if hiding:
+            self._hidden.see(hiding)
         maps = shadows.count.tolist() if shadows else [0] * len(lights)
         kinds = [
             (planned.groups, planned.light.shaping is not None, kind_of(count))
@@ -90,8 +90,7 @@ class LightTiles:
             for first in range(0, len(members), self._most):
                 chosen = records[members[first : first + self._most]]
                 self._write(chosen)
-                seeks = shadows is not None and hides and bool(kind[2])
-                hidden = self._hidden.find(variant, common, len(chosen), shadows) if shadows and seeks else None
+                hidden = self._hidden.find(variant, common, len(chosen), hiding) if hiding and kind[2] else None
                 lists = list_lights(light_bounds(chosen, self._camera_from_relative), self._boxes, hidden)
                 targets.of(kind[0]).use()
                 atlas = shadows.bind(array.program) if shadows else None

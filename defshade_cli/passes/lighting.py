@@ -93,8 +93,7 @@ class LightingVariant:
         """The shader's macros."""
         flags = ["CLASSIC"] * (self.shading == "classic") + ["ORTHOGRAPHIC"] * self.orthographic
         flags += (
-            ["SHADOWS"] * bool(self.shadows)
-            + [f"SHADOW_{kind.upper()}S" for kind in self.shadows]
+            self.shadow_defines
             + ["SHADOW_STYLES"] * self.shadow_styles
             + ["IES"] * self.ies
             + ["RESPONSES"] * self.responses
@@ -111,7 +110,7 @@ class LightingVariant:
     @property
     def shadow_defines(self) -> list[str]:
         """Those of a shader that looks at shadows alone."""
-        return ["SHADOWS"] + [f"SHADOW_{kind.upper()}S" for kind in self.shadows]
+        return ["SHADOWS"] * bool(self.shadows) + [f"SHADOW_{kind.upper()}S" for kind in self.shadows]
 
     @property
     def generated(self) -> dict[str, str]:

@@ -291,9 +291,11 @@ class Pipeline:
             openness.begin_sample(visibility)
         batches = light_batches(scene, plan, sample, canvas.guides) if plan.lit else ()
         for number, batch in enumerate(batches):
-            known = canvas.known.maps[number] if canvas.known.maps else None
-            request = MapRequest.of(batch, plan, sample, tables, 0 if self._lone else number)
-            shadows = self._shadow_maps(draws, plan, request, known) if plan.shadows else None
+            shadows = None
+            if plan.shadows:
+                known = canvas.known.maps[number] if canvas.known.maps else None
+                request = MapRequest.of(batch, plan, sample, tables, 0 if self._lone else number)
+                shadows = self._shadow_maps(draws, plan, request, known)
             lights, emitters = [lit.planned for lit in batch], [lit.emitter for lit in batch]
             records = light_records(lights, emitters, plan.camera.position, shadows, tables)
             self._lights.write(records)

@@ -160,11 +160,12 @@ class Narrowing:
     def of(self, drawn: Drawn | None, size: tuple[int, int]) -> Iterator[None]:
         """What is drawn of an image of (width, height) within the block; all after it, and where nothing is given."""
         self.end()
-        if drawn and drawn.seen is None:
-            self.to(drawn.tiles, drawn.side, size)
-        elif drawn and drawn.seen is not None:
-            self._screen.cover(regions_of(drawn.tiles, drawn.side, size))
-            self._mask.keep_around(drawn.seen)
+        if drawn:
+            if drawn.seen is None:
+                self.to(drawn.tiles, drawn.side, size)
+            else:
+                self._screen.cover(regions_of(drawn.tiles, drawn.side, size))
+                self._mask.keep_around(drawn.seen)
         try:
             yield
         finally:

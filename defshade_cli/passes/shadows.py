@@ -140,8 +140,10 @@ class ShadowPass:
 
     def _runs(self, draws: DrawList, maps: Maps, slot: int, part: Region | None) -> list[NDArray[Any]]:
         """What a map, or a part of it, may see in each turn."""
-        seen, clear = may_see(maps.clip_of(slot, part), draws.corners), is_clear_of(maps.cameras[slot], draws.corners)
-        return draws.caster_runs(seen, clear)[: len(self._turns)]
+        closed, fronts = np.flatnonzero(draws.fronts), np.zeros_like(draws.fronts)
+        clear = closed[is_clear_of(maps.cameras[slot], draws.corners[closed])]
+        fronts[clear] = draws.fronts[clear]
+        return draws.caster_runs(may_see(maps.clip_of(slot, part), draws.corners), fronts)[: len(self._turns)]
 
     def _show(self, fronts: int) -> None:
         """Both sides of all faces, or those alone that are fronts: see DrawList.fronts."""
