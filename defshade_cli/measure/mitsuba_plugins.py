@@ -1,6 +1,7 @@
 """The parts of Mitsuba 3 that defshade's light transport needs and Mitsuba lacks. The only place that extends it.
 
-Importing this needs mitsuba (the extra `reference`) and an LLVM of 17 or newer, which is searched by its names.
+Importing this needs mitsuba (the extra `reference`) and an LLVM of 17 or newer, which is searched by its names:
+else it raises ImportError and DefshadeError.
 """
 
 from __future__ import annotations
@@ -8,14 +9,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from defshade_cli.measure.brdf import COAT_F0, MIN_ALPHA, MIN_NOV, SMITH_GGX, edge_bound
 from defshade_cli.measure.llvm import find_llvm
 
 find_llvm()
-
-import drjit as dr  # noqa: E402
-import mitsuba as mi  # noqa: E402
-
 mi.set_variant("llvm_ad_rgb")
 
 
