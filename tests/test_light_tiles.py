@@ -35,7 +35,7 @@ SCENES = [
     "light_mesh",
     "materials",
 ]
-HIDING = ["light_cone", "light_many"]
+HIDING = ["light_cone", "light_distant", "light_dome", "light_many"]
 WINDOW = np.array([-0.8, 0.6, -0.5, 0.45])
 SIZE = (5 * TILE - 7, 3 * TILE + 1)
 

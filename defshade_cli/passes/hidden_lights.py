@@ -105,7 +105,7 @@ def are_worth_finding(plan: Plan, atlas: ShadowAtlas, lights: int) -> bool:
 
 def _compile(gpu: Gpu, variant: LightingVariant, common: Traits, most: int) -> moderngl.Program:
     generated = {**shadow_source(variant.shadows), "generated/lights.glsl": lights_source(most, common)}
-    defines = [*variant.shadow_defines, f"SHADOW_BLOCK {_BLOCK}"]
+    defines = [*variant.shadow_defines, *variant.distances, f"SHADOW_BLOCK {_BLOCK}"]
     return gpu.shaders.program("screen.vert", "hidden_lights.frag", defines=defines, generated=generated)
 
 
