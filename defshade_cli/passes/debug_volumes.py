@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cache
 
 import moderngl
@@ -11,10 +10,14 @@ from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import DEPTH_CLAMP, Gpu
 from defshade_cli.gpu.planes import uses_standard_depth
+from defshade_cli.gpu.residence import LIGHTS, RecordBuffer
 from defshade_cli.gpu.targets import Target
+from defshade_cli.passes.light_records import light_records
 from defshade_cli.passes.lighting import volume_array
 from defshade_cli.passes.screen import Screen
-from defshade_cli.plan import PlannedLight, Volume
+from defshade_cli.passes.tables import LightTables
+from defshade_cli.plan import Plan, Volume
+from defshade_cli.scene.emission import far_field
 from defshade_cli.settings import Layout
 
 _FILL, _WIRE, _HIDDEN, _FRAME = 0.03, 0.3, 0.08, 0.9
@@ -26,10 +29,14 @@ class DebugVolumesPass:
 
     def __init__(self, gpu: Gpu) -> None:
         self._context, self._screen = gpu.context, Screen(gpu)
+        self._records = RecordBuffer(gpu, LIGHTS)
         self._array = cache(lambda volume: self._compiled(gpu, volume))
 
-    def draw(self, lights: Sequence[PlannedLight], target: Target, layout: Layout) -> NDArray[np.float32]:
-        """(H, W, 4) premultiplied: the volumes of lights whose records are bound, as the depth shows them."""
+    def draw(self, plan: Plan, tables: LightTables, target: Target, layout: Layout) -> NDArray[np.float32]:
+        """(H, W, 4) premultiplied: the volumes of the plan's lights, domes apart, as the depth shows them."""
+        lights = [planned for planned in plan.lights if planned not in plan.domes]
+        emitters = [far_field(planned.light) for planned in lights]
+        self._records.write(light_records(lights, emitters, plan.camera.position, None, tables))
         self._clear(target)
         self._context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         self._context.depth_func = "<" if uses_standard_depth(layout) else ">"

@@ -19,6 +19,7 @@ from defshade_cli.gpu.textures import textures_source
 from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.culling import CommandBuffer, clip_of_part, may_see
 from defshade_cli.passes.screen import TileMask
+from defshade_cli.plan import Plan
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.window import WHOLE_IMAGE
 from defshade_cli.settings import Layout
@@ -68,6 +69,22 @@ class GBufferVariant:
     transparent: bool = False
     orthographic: bool = False
     many_uvs: bool = False
+
+    @classmethod
+    def of(cls, draws: DrawList, plan: Plan, gbuffer: GBuffer) -> GBufferVariant:
+        """For what is drawn, and where."""
+        return cls(
+            gbuffer.planes,
+            gbuffer.layout,
+            plan.cutout,
+            draws.color_varies,
+            draws.texture_groups,
+            plan.render_space,
+            len(plan.camera.clipping_planes),
+            plan.transparent,
+            plan.camera.projection == "orthographic",
+            draws.many_uvs,
+        )
 
     @property
     def defines(self) -> list[str]:
