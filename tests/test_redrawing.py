@@ -142,6 +142,7 @@ def drawn(job: RenderJob, renderer: Renderer) -> tuple[list[Film], list[str]]:
         (GLASS, {"samples": 3, "layers": ("beauty", "diffuse", "light:bulb")}),
         (INSTANCES, {"layers": DATA}),
         (BALL, {"layers": ("motionForward", "motionBackward")}),
+        (BALL, {"layers": ("depth",)}),
         (BALL, {"shadows": True, "layers": ("beauty", "shadow"), "lighting": "whole"}),
         (HIGHEST, {"shadows": True, "layers": DATA, "lighting": "whole"}),
         (AROUND + BALL, {"shadows": True, "lighting": "whole"}),
@@ -154,7 +155,7 @@ def drawn(job: RenderJob, renderer: Renderer) -> tuple[list[Film], list[str]]:
         (GLASS, {"shadows": True, "samples": 2, "lighting": "tiles"}),
     ],
     ids=[
-        *("plain", "data", "volumes", "tiles", "glass", "instances", "motion", "shadows", "highest"),
+        *("plain", "data", "volumes", "tiles", "glass", "instances", "motion", "depth", "shadows", "highest"),
         *("around", "around tiles", "around volumes", "fading", "glassy", "panel", "soft", "thin"),
     ],
 )

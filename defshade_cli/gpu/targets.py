@@ -71,6 +71,8 @@ class Target:
         self._write_colours(True)
 
     def _write_colours(self, written: bool) -> None:
+        if not self.textures:
+            return
         framebuffer: Any = self.framebuffer  # moderngl's own types know a mask for one texture
         mask = (written,) * 4
         framebuffer.color_mask = [mask] * len(self.textures) if len(self.textures) > 1 else mask
