@@ -2,7 +2,8 @@
 
 from defshade_cli.plan.decisions import Decision
 from defshade_cli.plan.lights import PlannedLight, Volume, volume_of
-from defshade_cli.plan.plan import Plan, ShutterSample, make_plan, plan_after, plan_moments
+from defshade_cli.plan.plan import Plan
+from defshade_cli.plan.planning import ShutterSample, make_plan, plan_after, plan_moments
 
 __all__ = [
     "Decision",

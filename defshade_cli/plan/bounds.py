@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 from defshade_cli.dataclass import dataclass
 
+SLACK = 1e-3
+"""Relative, around bounds that float32 may round outwards."""
+
 ROUNDING = 1e-4
 """Relative, for what float32 rounds in the shaders."""
 

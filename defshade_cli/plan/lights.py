@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.dataclass import dataclass
 from defshade_cli.image.light_texture import with_texture
+from defshade_cli.plan.bounds import SLACK
 from defshade_cli.plan.groups import group_lights, light_groups, light_outputs
 from defshade_cli.plan.overlap import reaches_into_ball
 from defshade_cli.plan.points import (
@@ -37,8 +38,6 @@ from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderSettings, Shading
 
 Volume = Literal["quad", "sphere", "cone"]
-
-_MARGIN = 1e-3  # relative slack around bounds that float32 may round outwards
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,7 +127,7 @@ def _reach(light: Light, bounds: NDArray[np.float64], gain: float) -> float:
     if light.is_infinite:
         return math.inf
     farthest = np.max(np.abs(bounds - light.position), axis=0)
-    geometry = float(np.linalg.norm(farthest)) * (1.0 + _MARGIN)
+    geometry = float(np.linalg.norm(farthest)) * (1.0 + SLACK)
     return min(math.sqrt(_peak(light) * gain), geometry)
 
 

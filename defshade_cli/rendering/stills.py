@@ -1,6 +1,6 @@
 """Frames like the one before: where nothing of a stage moves, what was drawn once is every frame's picture.
 
-Where a part moves, the passes draw that part: plan/redrawing.py.
+Where a part moves, the passes draw that part: plan/changes.py.
 """
 
 from __future__ import annotations
