@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from build import camera, drawable, quad, scene, sphere, sun
 from defshade_cli import render
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.residence import draw_commands
+from defshade_cli.gpu.draw_list import draw_commands
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.geometry import Subset

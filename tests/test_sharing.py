@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from defshade_cli.gpu import residence
+from defshade_cli.gpu import vertex_pool
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
@@ -147,9 +147,9 @@ def test_only_the_mesh_that_moved_is_uploaded(gpu: Gpu, monkeypatch: pytest.Monk
     pipeline = Pipeline(gpu)
     pipeline.render(scenes[0], plans[0])
     uploaded: list[str] = []
-    arrays_of = residence.vertex_arrays
+    arrays_of = vertex_pool.vertex_arrays
     monkeypatch.setattr(
-        residence,
+        vertex_pool,
         "vertex_arrays",
         lambda meshes, *a, **k: uploaded.extend(m.path for m in meshes) or arrays_of(meshes, *a, **k),
     )

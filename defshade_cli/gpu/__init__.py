@@ -6,8 +6,11 @@
     planes     the table of GBuffer planes → GLSL on both sides
     targets    textures and framebuffers that passes draw into
     textures   a Scene's textures in texture arrays
-    vertices   meshes as vertex arrays
-    residence  a Scene's arrays in GPU buffers
+    buffers    where shaders find records, and the buffers that hold them
+    vertices, vertex_pool   meshes as vertex arrays, and those in buffers
+    scene_records           placements and materials as records
+    draw_list               what is drawn of them
+    residence               a Scene in all of these
 
 Everything a Gpu makes lives on its ExitStack and is released with it; passes free nothing.
 """

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.planes import MOST_PRIMVARS
 from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.material import UV_SETS, Material
@@ -57,31 +58,44 @@ def in_slots(names: UvNames, slots: Mapping[str, int]) -> UvNames:
     return tuple(filled.get(slot, "") for slot in range(sets_of(slots)))
 
 
-def vertex_arrays(
-    meshes: Sequence[Mesh],
-    uvs: Sequence[UvNames],
-    *,
-    color_varies: bool,
-    textured: bool,
-    layer_uv: bool = False,
-    primvars: Sequence[str] = (),
-) -> Iterator[NDArray[Any]]:
-    """Positions (V, 3), normals (V, 3), indices (T, 3); colours (V, 3) and coordinates (V, 2) where asked for.
+@dataclass(frozen=True, slots=True)
+class Varying:
+    """What vertices have beside their points and normals.
+
+    uv_sets: of texture coordinates; 0 without textures.  layer_uv: a layer shows some.
+    primvars: names of those that layers show, at most MOST_PRIMVARS.
+    """
+
+    color_varies: bool
+    uv_sets: int
+    layer_uv: bool
+    primvars: tuple[str, ...]
+
+    @property
+    def attributes(self) -> list[tuple[str, str]]:
+        """The format of each, and its name in the shaders."""
+        found = [("4f", "vertex_color")] * self.color_varies
+        found += [(f"{2 * self.uv_sets}f", "vertex_uv")] * bool(self.uv_sets)
+        found += [("2f", "vertex_layer_uv")] * self.layer_uv
+        return found + [(f"{4 * MOST_PRIMVARS}f", "vertex_primvars")] * bool(self.primvars)
+
+
+def vertex_arrays(meshes: Sequence[Mesh], uvs: Sequence[UvNames], varying: Varying) -> Iterator[NDArray[Any]]:
+    """Positions (V, 3), normals (V, 3), indices (T, 3), and what varies beside them. uvs: what fills each one's sets.
 
     One after another, so that few are held at a time.
     """
     yield _joined([m.points for m in meshes], 3)
     yield _joined([m.normals for m in meshes], 3)
     yield _joined([m.triangles for m in meshes], 3, np.uint32)
-    if color_varies:
+    if varying.color_varies:
         yield _joined([_vertex_colors(m) for m in meshes], 4)
-    if textured:
-        width = 2 * max(map(len, uvs), default=0)
-        yield _joined([_vertex_uvs(m, names) for m, names in zip(meshes, uvs, strict=True)], width)
-    if layer_uv:
+    if varying.uv_sets:
+        yield _joined([_vertex_uvs(m, names) for m, names in zip(meshes, uvs, strict=True)], 2 * varying.uv_sets)
+    if varying.layer_uv:
         yield _joined([_layer_uvs(m) for m in meshes], 2)
-    if primvars:
-        yield _joined([_vertex_primvars(m, primvars) for m in meshes], 4 * MOST_PRIMVARS)
+    if varying.primvars:
+        yield _joined([_vertex_primvars(m, varying.primvars) for m in meshes], 4 * MOST_PRIMVARS)
 
 
 def _joined(arrays: Sequence[NDArray[Any]], width: int, dtype: type = np.float32) -> NDArray[Any]:

@@ -8,9 +8,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.gpu.buffers import LIGHTS, RecordBuffer
 from defshade_cli.gpu.context import DEPTH_CLAMP, Gpu
 from defshade_cli.gpu.planes import uses_standard_depth
-from defshade_cli.gpu.residence import LIGHTS, RecordBuffer
 from defshade_cli.gpu.targets import Target
 from defshade_cli.passes.light_records import light_records
 from defshade_cli.passes.lighting import volume_array

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.draw_list import DrawList
 from defshade_cli.gpu.planes import Plane, integer_attachments, planes_read, uses_standard_depth, write_source
 from defshade_cli.gpu.render_space import space_defines
-from defshade_cli.gpu.residence import DrawList
 from defshade_cli.gpu.shaders import set_textures
 from defshade_cli.gpu.targets import NOWHERE, Part, Target, allocate
 from defshade_cli.gpu.textures import textures_source

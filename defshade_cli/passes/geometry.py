@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.gpu.buffers import MOTIONS, VIEW_BLOCK, RecordBuffer
 from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.draw_list import DrawList
 from defshade_cli.gpu.planes import MOST_TARGETS, Plane
-from defshade_cli.gpu.residence import MOTIONS, VIEW_BLOCK, DrawList, GpuScene, RecordBuffer
+from defshade_cli.gpu.residence import GpuScene
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer, GBufferPass, GBufferVariant
 from defshade_cli.passes.readback import Planes, read_planes

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.residence import DrawList
+from defshade_cli.gpu.draw_list import DrawList
 from defshade_cli.image.film import Film
 from defshade_cli.passes.changed_parts import MOST_CHANGES, PART, ChangedPartsPass, parts_of
 from defshade_cli.passes.changed_tiles import changed_tiles, part_around, worthwhile

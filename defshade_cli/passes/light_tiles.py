@@ -15,9 +15,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.gpu.buffers import LIGHT_BLOCK, LIGHT_LISTS, RecordBuffer
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.records import record
-from defshade_cli.gpu.residence import LIGHT_BLOCK, LIGHT_LISTS, RecordBuffer
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.hidden_lights import HiddenLights, are_worth_finding

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.gpu.buffers import LIGHT_BLOCK
 from defshade_cli.gpu.records import block_source, literal
-from defshade_cli.gpu.residence import LIGHT_BLOCK
 from defshade_cli.passes.light_records import NO_CONE, NO_IES
 
 Traits = tuple[tuple[str, str], ...]

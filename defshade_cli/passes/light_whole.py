@@ -13,9 +13,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from defshade_cli.gpu.buffers import LIGHT_BLOCK, RecordBuffer
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import background_depth
-from defshade_cli.gpu.residence import LIGHT_BLOCK, RecordBuffer
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.light_targets import LightTargets
 from defshade_cli.passes.light_traits import Traits, traits_of, written_out_source

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.dataclass import dataclass
+from defshade_cli.gpu.buffers import BOXES, CELLS, LAMPS, TRIANGLES, RecordBuffer
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.planes import background_depth
-from defshade_cli.gpu.residence import BOXES, CELLS, LAMPS, TRIANGLES, RecordBuffer
 from defshade_cli.gpu.shaders import set_uniforms
 from defshade_cli.image.environment import sky_of
 from defshade_cli.passes.gbuffer import GBuffer

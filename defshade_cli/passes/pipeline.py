@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import cache
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.residence import DrawList
+from defshade_cli.gpu.draw_list import DrawList
 from defshade_cli.image.film import Film, Sampling
 from defshade_cli.passes.accumulation import AccumulationPass
 from defshade_cli.passes.changed_tiles import Layers, beside

@@ -6,8 +6,9 @@ from collections.abc import Callable, Sequence
 from functools import cache
 
 from defshade_cli.dataclass import dataclass
+from defshade_cli.gpu.buffers import LIGHTS, RecordBuffer
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.residence import LIGHTS, DrawList, RecordBuffer
+from defshade_cli.gpu.draw_list import DrawList
 from defshade_cli.passes.emission import EmissionPass
 from defshade_cli.passes.emitters import LitSample, light_batches
 from defshade_cli.passes.environment import EnvironmentPass, EnvironmentVariant

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.residence import DrawList
+from defshade_cli.gpu.draw_list import DrawList
 from defshade_cli.image.film import Sampling
 from defshade_cli.passes.accumulation import AccumulationPass
 from defshade_cli.passes.changed_tiles import Layers

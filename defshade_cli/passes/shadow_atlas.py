@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.dataclass import dataclass
+from defshade_cli.gpu.buffers import SHADOW_BLOCK
 from defshade_cli.gpu.records import block_source, record
-from defshade_cli.gpu.residence import SHADOW_BLOCK
 from defshade_cli.gpu.shaders import set_uniforms
 from defshade_cli.passes.view import clip_from_camera, depth_coefficients
 from defshade_cli.plan.shadow_maps import ATLAS, CUBE_FACES

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.dataclass import dataclass
+from defshade_cli.gpu.buffers import SHADOW_BLOCK, RecordBuffer
 from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.draw_list import CASTER_FRONTS, DrawList
 from defshade_cli.gpu.render_space import space_defines
-from defshade_cli.gpu.residence import CASTER_FRONTS, SHADOW_BLOCK, DrawList, RecordBuffer
 from defshade_cli.gpu.textures import textures_source
 from defshade_cli.image.render_space import REC709, RenderSpace
 from defshade_cli.passes.culling import CommandBuffer, is_clear_of, may_see

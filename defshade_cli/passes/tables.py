@@ -9,8 +9,8 @@ import moderngl
 import numpy as np
 
 from defshade_cli.dataclass import dataclass
+from defshade_cli.gpu.buffers import LINKS, RecordBuffer
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.gpu.residence import LINKS, RecordBuffer
 from defshade_cli.passes.linking import NOTHING_LINKED, LinkBits, link_bits
 from defshade_cli.plan import Plan
 

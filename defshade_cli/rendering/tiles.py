@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from defshade_cli.errors import GpuMemoryError
-from defshade_cli.gpu.residence import DrawList
+from defshade_cli.gpu.draw_list import DrawList
 from defshade_cli.image.film import Film
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import Plan, ShutterSample
