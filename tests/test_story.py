@@ -11,8 +11,8 @@ import pytest
 
 from defshade_cli.errors import OutputError, StageError
 from defshade_cli.image.reading import read
-from defshade_cli.rendering import Renderer, run, story
-from defshade_cli.settings import OutputSettings, RenderJob, RenderSettings
+from defshade_cli.rendering import Renderer, render, run, story
+from defshade_cli.settings import Layout, OutputSettings, RenderJob, RenderSettings
 
 STAGE = '#usda 1.0\ndef Sphere "ball" {}\ndef DistantLight "sun" {}\n'
 
@@ -140,3 +140,34 @@ def test_a_single_image_is_that_of_a_job_with_more(job: RenderJob, layers: tuple
                 assert first is not None and alone is not None
                 for name in first.layers:
                     np.testing.assert_array_equal(alone.layers[name], first.layers[name])
+
+
+BLINKING = """#usda 1.0
+def Camera "cam" {
+    float2 clippingRange = (1, 100)
+    double shutter:open = 0
+    double shutter:close = 0.5
+    double3 xformOp:translate = (0, 0, 9)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}
+def Sphere "ball" {
+    token visibility.timeSamples = { 1: "inherited", 2: "invisible", 2.25: "inherited" }
+}
+"""
+
+
+@pytest.mark.parametrize("light", ["", 'def DistantLight "sun" {}\n', 'def DomeLight "sky" {}\n'])
+@pytest.mark.parametrize("layout", ["float", "rgba8"])
+def test_a_frame_in_which_all_is_hidden_is_drawn(tmp_path: Path, light: str, layout: Layout) -> None:
+    (tmp_path / "a.usda").write_text(BLINKING + light)
+    film = render(tmp_path / "a.usda", frame=2.0, size=(16, 9), layout=layout, background=False, shadows=False)
+    assert not film.layers["beauty"].any()
+
+
+def test_what_appears_while_the_shutter_is_open_is_lit(tmp_path: Path) -> None:
+    """Nothing is there at the frame itself: half of its moments see the ball, at other places in the pixel."""
+    (tmp_path / "a.usda").write_text(BLINKING + 'def DistantLight "sun" {}\n')
+    films = (render(tmp_path / "a.usda", frame=frame, size=(16, 9), samples=32) for frame in (1.0, 2.0))
+    shown, late = (film.layers["beauty"][4, 8] for film in films)
+    assert shown.min() > 0.1
+    np.testing.assert_allclose(late, 0.5 * shown, rtol=0.1)

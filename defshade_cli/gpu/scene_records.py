@@ -47,6 +47,8 @@ def material_records(materials: Sequence[Material], input_counts: Sequence[int])
     """One Material record each, (M,); fields of the same name are copied. input_counts: texture inputs of each."""
     dtype = record("Material")
     records = np.zeros(len(materials), dtype)
+    if not materials:
+        return records
     for name in sorted(set(dtype.names or ()) - {"first_input", "input_count"}):
         records[name] = [getattr(material, name) for material in materials]
     records["input_count"] = input_counts

@@ -6,7 +6,7 @@ from defshade_cli.errors import UsageError
 from defshade_cli.gpu.planes import MOST_PRIMVARS, MOST_TARGETS, Plane, named_planes, needed_planes
 from defshade_cli.image.layers import LAYERS, PRIMVAR_FAMILY
 from defshade_cli.plan.opacity import is_transparent
-from defshade_cli.scene.material import Material
+from defshade_cli.scene.material import UNBOUND, Material
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderSettings
 
@@ -44,6 +44,6 @@ def divide_planes(
 
 
 def _lit_planes(scene: Scene, settings: RenderSettings, thin: tuple[Material, ...]) -> tuple[Plane, ...]:
-    names = [plane.name for plane in needed_planes(scene.materials)]
+    names = [plane.name for plane in needed_planes(scene.materials or (UNBOUND,))]
     weights = ["weights"] * is_transparent(thin, settings.shading)
     return named_planes([*names, *["links"] * scene.light_linked, *weights])
