@@ -38,6 +38,7 @@ class Material:
     uses_display_opacity: opacity likewise. A prim without a bound material has both, a material that reads
         the primvars either.
     color_primvar: what is read in the place of displayColor; empty for displayColor itself.
+    primvars: what each prim that the material is on has for its fields, by their names; none in a Scene.
     one_sided: not seen from behind; only for materials whose opacity is textured, as the cards of draw modes are.
     inputs: the textures, by the name of the field in TEXTURED_FIELDS that they replace.
     """
@@ -60,6 +61,7 @@ class Material:
     uses_display_opacity: bool = False
     color_primvar: str = ""
     one_sided: bool = False
+    primvars: Mapping[str, str] = field(default_factory=dict, hash=False)
     inputs: Mapping[str, TextureInput] = field(default_factory=dict, hash=False)
 
     @property

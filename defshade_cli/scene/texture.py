@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field
-from typing import Literal
+from dataclasses import field, replace
+from typing import Literal, Self
 
 from defshade_cli.dataclass import dataclass
 from defshade_cli.spaces import Matrix
@@ -60,6 +60,7 @@ class TextureInput:
 
     channel: one letter fills all channels, to each of which scale and bias then apply.
     uv: primvar that holds the texture coordinates; empty for none, the affine's offset alone then counts.
+    fallback: (u, v) on what lacks that primvar.
     A UDIM tile that is missing is black with alpha 0; where no file can be read, the material's own value stands.
     """
 
@@ -69,3 +70,10 @@ class TextureInput:
     bias: Four = (0.0, 0.0, 0.0, 0.0)
     uv: str = "st"
     texture_from_uv: Affine = IDENTITY
+    fallback: tuple[float, float] = (0.0, 0.0)
+
+    def at_fallback(self) -> Self:
+        """The same as it is read everywhere on what lacks the primvar."""
+        (a, b, x), (c, d, y) = self.texture_from_uv
+        u, v = self.fallback
+        return replace(self, uv="", texture_from_uv=((0.0, 0.0, a * u + b * v + x), (0.0, 0.0, c * u + d * v + y)))

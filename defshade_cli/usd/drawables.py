@@ -40,15 +40,15 @@ def drawables_of(
         gprim = gprims[surface]
         if not gprim.groups:
             continue
-        materials = [palette.material(piece.bindings[group.path]) for group in gprim.groups]
-        if piece in glowing:
-            glow, lights = glowing[piece]
-            materials = [shown_material(material, glow, lights[0]) for material in materials]
-        numbers = tuple([palette.number_of(material) for material in materials])
-        named = len(piece.paths) == len(piece.ids)
-        key = meshes.setdefault(gprim.mesh, len(meshes)), numbers, named or piece
-        alike[key].append(piece)
-        looks[key] = materials[0], gprim.groups
+        for part, materials in palette.worn(piece, gprim):
+            if piece in glowing:
+                glow, lights = glowing[piece]
+                materials = [shown_material(material, glow, lights[0]) for material in materials]
+            numbers = tuple([palette.number_of(material) for material in materials])
+            named = len(part.paths) == len(part.ids)
+            key = meshes.setdefault(gprim.mesh, len(meshes)), numbers, named or part
+            alike[key].append(part)
+            looks[key] = materials[0], gprim.groups
     standing = _standing(list(alike.values()), [material for material, _ in looks.values()])
     for (mesh, numbers, _), pieces, (_, groups), placed in zip(
         alike, alike.values(), looks.values(), standing, strict=True

@@ -61,7 +61,7 @@ class Memory:
 
     seen_from: for cards placed by their textures.
     as_cages: what is round is what Hydra draws of it: see gprims.read_solid, and facing.
-    kinds: of prims.  clipped: see stage.has_clips.  instanced: are there native instances?
+    stage: what is read.  kinds: of prims.  clipped: see stage.has_clips.  instanced: are there native instances?
     xforms: USD's cache, which drops only what varies when its time is set.
     """
 
@@ -77,7 +77,7 @@ class Memory:
         self.clipped = has_clips(stage)
         self.instanced = bool(stage.GetPrototypes())
         self.xforms = UsdGeom.XformCache()
-        self._stage, self._extras, self._as_cages = stage, extras, as_cages
+        self.stage, self._extras, self._as_cages = stage, extras, as_cages
         self._shapes = Shapes()
         self._surfaces: dict[str, tuple[Usd.TimeCode, Surface | None]] = {}
         self._time_varying: dict[str, bool] = {}
@@ -211,7 +211,7 @@ class Memory:
         try:
             read = self._read_material(path, time)
         except Exception as error:  # a bug goes on as one
-            reason = blamed(error, self._stage.GetPrimAtPath(path.GetPrimPath()))
+            reason = blamed(error, self.stage.GetPrimAtPath(path.GetPrimPath()))
             read = not_understood(self.shown(path), reason)
         if not read.time_varying:
             self._materials[path] = read
@@ -219,8 +219,8 @@ class Memory:
 
     def _read_material(self, path: Sdf.Path, time: Usd.TimeCode) -> ReadMaterial:
         if path.IsPropertyPath():
-            return draw_mode.read_material(self._stage, path, self.shown(path))
-        return read_material(self._stage, path, self.shown(path), time, occlusion=self._extras.occlusion)
+            return draw_mode.read_material(self.stage, path, self.shown(path))
+        return read_material(self.stage, path, self.shown(path), time, occlusion=self._extras.occlusion)
 
     def bindings(self, path: Sdf.Path | str) -> Bindings:
         """Relationships do not vary over time."""
@@ -236,8 +236,8 @@ class Memory:
             above.append(parent)
         bound = self._bindings[parent]
         for each in reversed(above):
-            bound = self._bindings[each] = read_bound(self._stage.GetPrimAtPath(each), bound, self._bound_directly)
-        prim = prim or self._stage.GetPrimAtPath(path)
+            bound = self._bindings[each] = read_bound(self.stage.GetPrimAtPath(each), bound, self._bound_directly)
+        prim = prim or self.stage.GetPrimAtPath(path)
         bound = self._bindings[path] = read_bound(prim, bound, self._bound_directly, said)
         return bound
 

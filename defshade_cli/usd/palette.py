@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
+import numpy as np
 from pxr import Usd
 
 from defshade_cli.scene.material import UNBOUND, Material
 from defshade_cli.scene.scene import Unsupported
+from defshade_cli.usd.instancing.instancing import Piece, some
 from defshade_cli.usd.materials.binding import PURPOSES, Bindings
+from defshade_cli.usd.materials.worn import Value, on_mesh, read_values, with_primvars
 from defshade_cli.usd.memory import Memory
+from defshade_cli.usd.surfaces.geometry import Gprim
 
 
 class Palette:
@@ -45,6 +49,24 @@ class Palette:
         if chosen is None:
             chosen = self._chosen[bindings] = self._choose(bindings)
         return chosen
+
+    def worn(self, piece: Piece, gprim: Gprim) -> Iterator[tuple[Piece, list[Material]]]:
+        """The piece with the material of each group; in parts, where the prims have primvars that these read."""
+        materials = [on_mesh(self.material(piece.bindings[group.path]), gprim.mesh) for group in gprim.groups]
+        names = tuple(dict.fromkeys(name for material in materials for name in material.primvars.values()))
+        if not names:
+            yield piece, materials
+            return
+        read = [read_values(self._memory.stage, path, names, self._time, self.issues) for path in piece.paths]
+        for values in dict.fromkeys(read):
+            part = piece if len(read) == 1 else some(piece, np.array([each == values for each in read]))
+            yield part, [self._filled(material, dict(zip(names, values, strict=True))) for material in materials]
+
+    def _filled(self, material: Material, values: Mapping[str, Value]) -> Material:
+        reasons: list[str] = []
+        filled = with_primvars(material, values, reasons)
+        self.issues.update(dict.fromkeys(Unsupported(material.path, f"without {reason}") for reason in reasons))
+        return filled
 
     def _choose(self, bindings: Bindings) -> Material:
         candidates = [self._memory.material(path, self._time) for path in bindings.candidates_for(self._purposes)]

@@ -1,10 +1,10 @@
 """UsdShade materials as scene.Material.
 
-Read are UsdPreviewSurface nodes whose inputs are constant or come from a UsdUVTexture, also through the interfaces of
-materials and node graphs, and readers of displayColor. Any other source of an input is named in the report, and so is
-a texture without its file: the input then takes the fallback that is authored on the node in its place, or the
-schema's default. MaterialX shaders are translated by usd/materialx; a material that has both is a UsdPreviewSurface,
-of which nothing is lost.
+Read are UsdPreviewSurface nodes whose inputs are constant or come from a UsdUVTexture or a primvar, also through the
+interfaces of materials and node graphs; usd/materials/worn.py asks the prims for their primvars. Any other source of an
+input is named in the report, and so is a texture without its file: the input then takes the fallback that is authored
+on the node in its place, or the schema's default. MaterialX shaders are translated by usd/materialx; a material that
+has both is a UsdPreviewSurface, of which nothing is lost.
 """
 
 from __future__ import annotations
@@ -52,7 +52,6 @@ _SHARES = ("metallic", "roughness", "clearcoat", "clearcoat_roughness", "opacity
 _DEFAULTS = {f.name: f.default for f in fields(Material)}
 _CHANNELS = {"r": slice(0, 1), "g": slice(1, 2), "b": slice(2, 3), "a": slice(3, 4)}
 _READER = "UsdPrimvarReader_"
-_FROM_PRIMVARS = ("diffuseColor", "opacity")
 _DISPLAY_OPACITY = "displayOpacity"
 _PREVIEW_SURFACE = "UsdPreviewSurface"
 _MATERIALX = "mtlx"
@@ -75,6 +74,7 @@ class _Inputs:
     network: Network
     values: dict[str, Any] = field(default_factory=dict)
     textures: dict[str, TextureInput] = field(default_factory=dict)
+    primvars: dict[str, str] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
 
 
@@ -92,14 +92,16 @@ def read_material(
     shader, identifier = _surface_of(prim)
     if identifier == _PREVIEW_SURFACE:
         inputs = _read_inputs(shader, network, () if occlusion else _WITHOUT_EFFECT)
-        material = Material(shown_as, **_sound(inputs.values, inputs.left_out), inputs=inputs.textures)
+        material = Material(
+            shown_as, **sound(inputs.values, inputs.left_out), primvars=inputs.primvars, inputs=inputs.textures
+        )
         reason, left_out = "without", inputs.left_out
     elif _is_understood(identifier):
         from defshade_cli.usd.materials.materialx.models import translate
 
         translation = translate(shader, identifier, network, occlusion=occlusion)
         reason, left_out = f"lost of {identifier}:", list(translation.lost)
-        material = Material(shown_as, **_sound(translation.values, left_out), inputs=translation.textures)
+        material = Material(shown_as, **sound(translation.values, left_out), inputs=translation.textures)
     else:
         return not_understood(shown_as, _surface_named(prim, shader, identifier))
     left_out.extend(f"textures at primvar {name}" for name in material.uv_names[UV_SETS:])
@@ -157,7 +159,7 @@ def _take(inputs: _Inputs, name: str, value: Any) -> None:
     if _FIELDS.get(name) not in _DEFAULTS or value is None:
         return
     try:
-        inputs.values[_FIELDS[name]] = _as_field(value, _DEFAULTS[_FIELDS[name]])
+        inputs.values[_FIELDS[name]] = as_field(value, _DEFAULTS[_FIELDS[name]])
     except (TypeError, ValueError):
         inputs.left_out.append(f"{name} ({type(value).__name__})")
 
@@ -166,8 +168,8 @@ def _take_from_node(inputs: _Inputs, name: str, output: Usd.Attribute) -> None:
     """A value that a node computes: a texture or a primvar; where it has none, and of all other nodes, the fallback."""
     node, identifier = node_of(output)
     varname = inputs.network.value(node, "varname") if identifier.startswith(_READER) else None
-    if name in _FROM_PRIMVARS and varname:
-        _take_from_primvar(inputs, name, node, str(varname))
+    if varname and (name == "diffuseColor" or (name == "opacity" and varname == _DISPLAY_OPACITY)):
+        _take_from_display(inputs, name, node, str(varname))
         return
     _take(inputs, name, _fallback(inputs.network, node, output.GetBaseName()))
     if identifier == "UsdUVTexture" and _FIELDS.get(name) in TEXTURED_FIELDS:
@@ -175,23 +177,23 @@ def _take_from_node(inputs: _Inputs, name: str, output: Usd.Attribute) -> None:
             inputs.textures[_FIELDS[name]] = read_texture_input(inputs.network, output)
         except Unreadable as reason:
             inputs.left_out.append(f"{name} ({reason})")
+    elif varname and isinstance(_DEFAULTS.get(_FIELDS.get(name, "")), float | tuple):
+        inputs.primvars[_FIELDS[name]] = str(varname)
     else:
         inputs.left_out.append(f"{name} (primvar {varname})" if varname else f"{name} ({identifier})")
 
 
-def _take_from_primvar(inputs: _Inputs, name: str, node: UsdShade.Shader, varname: str) -> None:
-    """Any primvar for the colour; for the opacity displayOpacity alone."""
+def _take_from_display(inputs: _Inputs, name: str, node: UsdShade.Shader, varname: str) -> None:
+    """What may vary over a prim: any primvar for the colour, for the opacity displayOpacity."""
     _take(inputs, name, _fallback(inputs.network, node, "result"))
     if name == "diffuseColor":
         inputs.values["uses_display_color"] = True
         inputs.values["color_primvar"] = "" if varname == DISPLAY_COLOR else varname
-    elif varname == _DISPLAY_OPACITY:
-        inputs.values["uses_display_opacity"] = True
     else:
-        inputs.left_out.append(f"{name} (primvar {varname})")
+        inputs.values["uses_display_opacity"] = True
 
 
-def _sound(values: Mapping[str, Any], left_out: list[str]) -> dict[str, Any]:
+def sound(values: Mapping[str, Any], left_out: list[str]) -> dict[str, Any]:
     """The values that light can be reckoned with; the others are named, and the schema's defaults take their place."""
     odd = [name for name, value in values.items() if not is_finite(value)]
     left_out.extend(f"{name} (not finite)" for name in odd)
@@ -212,8 +214,11 @@ def _fallback(network: Network, node: UsdShade.Shader, channel: str) -> Any:
     return value if value is None or channel not in _CHANNELS else np.asarray(value)[_CHANNELS[channel]]
 
 
-def _as_field(value: Any, default: Any) -> Any:
-    """`value` as the type of the field's default; a scalar fills a colour, a colour beyond three channels is cut."""
+def as_field(value: Any, default: Any) -> Any:
+    """`value` as the type of the field's default; a scalar fills a colour, a colour beyond three channels is cut.
+
+    Raises TypeError or ValueError for what is of no such type.
+    """
     if isinstance(default, tuple):
         channels = np.ravel(np.asarray(value, np.float64))
         return tuple(np.broadcast_to(channels[:3], 3).tolist())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, cast, get_args
+from typing import Any, NamedTuple, cast, get_args
 
 import numpy as np
 from pxr import Ar, Sdf, Usd, UsdShade
@@ -29,6 +29,14 @@ _MOST_TRANSFORMS = 64
 """One after another; a network of more is taken for one that runs in a circle."""
 
 
+class _Coordinates(NamedTuple):
+    """As in TextureInput."""
+
+    uv: str
+    texture_from_uv: Affine
+    fallback: tuple[float, float] = (0.0, 0.0)
+
+
 class Unreadable(Exception):
     """A network, or a file, that no texture can be made of; its text says why in a few words."""
 
@@ -40,7 +48,7 @@ def read_texture_input(network: Network, output: Usd.Attribute) -> TextureInput:
     asset = network.of(attribute) if attribute and not computed(attribute) else None
     if not isinstance(asset, Sdf.AssetPath) or not asset.path:
         raise Unreadable("texture without file")
-    uv, texture_from_uv = _coordinates(network, network.source(node, "st"))
+    coordinates = _coordinates(network, network.source(node, "st"))
     texture = Texture(
         tiles=image_tiles(asset, attribute),
         udim=UsdShade.UdimUtils.IsUdimIdentifier(asset.path),
@@ -54,8 +62,9 @@ def read_texture_input(network: Network, output: Usd.Attribute) -> TextureInput:
         channel,
         scale=_of_channel(channel, network.value(node, "scale", (1, 1, 1, 1))),
         bias=_of_channel(channel, network.value(node, "bias", (0, 0, 0, 0))),
-        uv=uv,
-        texture_from_uv=texture_from_uv,
+        uv=coordinates.uv,
+        texture_from_uv=coordinates.texture_from_uv,
+        fallback=coordinates.fallback,
     )
 
 
@@ -71,20 +80,21 @@ def _of_channel(channel: Channel, value: Any) -> Four:
     return four if channel == "rgb" else (four["rgba".index(channel)],) * 4
 
 
-def _coordinates(network: Network, source: Usd.Attribute | None, left: int = _MOST_TRANSFORMS) -> tuple[str, Affine]:
-    """(primvar, texture_from_uv) of what feeds `st`, transforms multiplied together; no primvar for a constant."""
+def _coordinates(network: Network, source: Usd.Attribute | None, left: int = _MOST_TRANSFORMS) -> _Coordinates:
+    """What feeds `st`, transforms multiplied together; no primvar for a constant."""
     if source is None or not computed(source):
         u, v = _floats((source and network.of(source)) or (0, 0), 2)
-        return "", ((0.0, 0.0, u), (0.0, 0.0, v))
+        return _Coordinates("", ((0.0, 0.0, u), (0.0, 0.0, v)))
     node, identifier = node_of(source)
     if identifier in _READERS:
-        return str(network.value(node, "varname", "")), IDENTITY
+        u, v, *_ = np.ravel(network.value(node, "fallback", (0, 0))).tolist()
+        return _Coordinates(str(network.value(node, "varname", "")), IDENTITY, (u, v))
     if identifier != "UsdTransform2d":
         raise Unreadable(f"texture coordinates of {identifier}")
     if not left:
         raise Unreadable("texture coordinates that run in a circle")
-    uv, below = _coordinates(network, network.source(node, "in"), left - 1)
-    return uv, _product(_transform(network, node), below)
+    below = _coordinates(network, network.source(node, "in"), left - 1)
+    return below._replace(texture_from_uv=_product(_transform(network, node), below.texture_from_uv))
 
 
 def _transform(network: Network, node: UsdShade.Shader) -> Affine:

@@ -1,0 +1,79 @@
+"""Materials as prims wear them: primvars in their fields, and what stands in for coordinates that they lack."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from defshade_cli.scene.material import Material
+from stages import reasons
+from test_material import BINDS, READER, network, read, read_inputs, surface
+
+
+def metallic_of(primvars: str, kind: str = "float") -> dict[str, float]:
+    """By path, what of the cubes below `primvars` is metal by their primvar `rust`; 0.75 is the reader's fallback."""
+    reader = READER.format(type=kind, name="rust", fallback=f"{kind} inputs:fallback = 0.75")
+    material = surface("m", "float inputs:metallic.connect = </m/reader.outputs:result>", reader)
+    scene = read(material + primvars)
+    assert not any(m.primvars for m in scene.materials)
+    return {path: scene.materials[d.subsets[0].material].metallic for d in scene.drawables for path in d.paths}
+
+
+RUSTY = f'Xform "%s" {BINDS} {{\nrel material:binding = </m>\n%s\ndef Cube "cube" {{\n}}\n}}\n'
+
+
+@pytest.mark.parametrize(
+    ("primvar", "metallic"),
+    [
+        ("", 0.75),
+        ("float primvars:rust = 0.25", 0.25),
+        ("float[] primvars:rust = [0.25]", 0.25),
+        ('float[] primvars:rust = [0.5, 0.25] (interpolation = "constant")\nint[] primvars:rust:indices = [1]', 0.25),
+        ("half primvars:rust = 2", 1.0),
+        ('string primvars:rust = "much"', 0.75),
+    ],
+)
+def test_a_primvar_can_feed_any_number(primvar: str, metallic: float) -> None:
+    assert metallic_of("def " + RUSTY % ("a", primvar)) == {"/a/cube": metallic}
+
+
+def test_instances_have_the_primvars_that_they_inherit() -> None:
+    copies = (
+        f'def Xform "{name}" (\ninstanceable = true\ninherits = </tree>\n) {{\n{primvar}\n}}\n'
+        for name, primvar in (("a", "float primvars:rust = 0"), ("b", ""), ("c", "float primvars:rust = 0"))
+    )
+    found = metallic_of("class " + RUSTY % ("tree", "") + "".join(copies))
+    assert found == {"/a/cube": 0.0, "/b/cube": 0.75, "/c/cube": 0.0}
+
+
+def test_a_primvar_that_varies_over_a_prim_feeds_no_number_and_is_named() -> None:
+    reader = READER.format(type="float", name="rust", fallback="")
+    material = surface("m", "float inputs:metallic.connect = </m/reader.outputs:result>", reader)
+    varying = 'float[] primvars:rust = [0, 1, 0, 1, 0, 1, 0, 1] (interpolation = "vertex")'
+    scene = read(f'{material}\ndef Cube "cube" {BINDS} {{\n{varying}\nrel material:binding = </m>\n}}')
+    assert scene.materials == (Material("/m"),)
+    assert reasons(scene, "/cube") == ["primvars:rust is left out: only colours may vary over a prim"]
+
+
+TRIANGLE = """int[] faceVertexCounts = [3]
+int[] faceVertexIndices = [0, 1, 2]
+point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0)]
+uniform token subdivisionScheme = "none"
+"""
+
+
+@pytest.mark.parametrize(("primvar", "uv"), [("", ""), ("texCoord2f primvars:map = (1, 1)", "map")])
+def test_a_prim_without_coordinates_is_read_at_the_readers_fallback(tmp_path: Path, primvar: str, uv: str) -> None:
+    (tmp_path / "wood.png").touch()
+    stage = Path(network(tmp_path, "wood.png"))
+    text = stage.read_text().replace(
+        "string inputs:varname", "float2 inputs:fallback = (0.5, 0.25)\nstring inputs:varname"
+    )
+    mesh = text.replace('def Cube "cube"', 'def Mesh "cube"').replace("rel mat", f"{TRIANGLE}{primvar}\nrel mat")
+    stage.write_text(mesh)
+    read_at = read_inputs(str(stage))["diffuse_color"]
+    assert read_at.uv == uv
+    if not uv:  # turned by 90 degrees, scaled and moved, as COORDINATES says
+        np.testing.assert_allclose(read_at.texture_from_uv, [[0, 0, 4 - 0.25 * 3], [0, 0, 5 + 0.5 * 2]], atol=1e-12)
