@@ -53,6 +53,12 @@ def viewport(slot: int, resolution: int) -> tuple[int, int, int, int]:
     return column * resolution, row * resolution, resolution, resolution
 
 
+def taken(maps: int, resolution: int) -> tuple[int, int]:
+    """(width, height) of the first slots, as many as maps; in texels."""
+    columns = ATLAS // resolution
+    return min(maps, columns) * resolution, -(-maps // columns) * resolution
+
+
 def shadow_source(kinds: Sequence[ShadowKind]) -> dict[str, str]:
     """What lib/shadow.glsl includes."""
     block = block_source("ShadowMap", _MOST_RECORDS, SHADOW_BLOCK) if "map" in kinds else ""

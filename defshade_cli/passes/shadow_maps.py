@@ -21,6 +21,7 @@ from defshade_cli.passes.shadow_atlas import (
     cube_uniforms,
     map_records,
     placed,
+    taken,
     viewport,
 )
 from defshade_cli.passes.shadow_changes import Region
@@ -107,11 +108,10 @@ class MapTarget:
 
     def begin(self, maps: Maps) -> None:
         """Empty ones in place of what it holds."""
-        self.maps, count, side = maps, len(maps.cameras), maps.resolution
-        columns = min(count, ATLAS // side)
+        self.maps = maps
         self._framebuffer.use()
-        if count:
-            self._framebuffer.clear(depth=0.0, viewport=(0, 0, columns * side, -(-count // columns) * side))
+        if maps.cameras:
+            self._framebuffer.clear(depth=0.0, viewport=(0, 0, *taken(len(maps.cameras), maps.resolution)))
 
     def keep_to(self, slot: int, region: Region | None) -> None:
         """Draw a map, or a part of it, from now on."""
@@ -150,7 +150,7 @@ def shadow_atlas(target: MapTarget, request: MapRequest) -> ShadowAtlas:
         target.depth,
         first,
         count,
-        rows_used=-(-len(maps) // (ATLAS // side)) * side,
+        rows_used=taken(len(maps), side)[1],
         first_record=(np.cumsum(count == 1) - 1).astype(np.uint32),
         records=map_records(maps, first[count == 1].tolist(), side),
         uniforms=cube_uniforms(maps[cubes[0]], side) if len(cubes) else {},
