@@ -102,6 +102,20 @@ def test_a_tube_is_round_and_faces_outwards() -> None:
     np.testing.assert_allclose(drawn.mesh.normals[:, :2] * 0.25, drawn.mesh.points[:, :2], atol=1e-6)
 
 
+ARC = [(1, 0, 0), (1, 0.5523, 0), (0.5523, 1, 0), (0, 1, 0)]
+"""Of a quarter circle, from which it departs by 3e-4."""
+
+
+def test_few_curves_bend_smoothly_and_many_keep_to_the_budget() -> None:
+    """Chords of 1/32 of a right angle are 3e-4 of its radius within the arc."""
+    drawn = read(curves(ARC, [4], "bezier", width=0.02))
+    middles = drawn.mesh.points[drawn.mesh.triangles].mean(axis=1)
+    np.testing.assert_allclose(np.linalg.norm(middles, axis=1), 1, atol=0.0105)
+    assert len(drawn.mesh.triangles) == 2 * 32 * 24
+    many = read(curves(ARC * 1000, [4] * 1000, "bezier", width=0.02))
+    assert len(many.mesh.triangles) == 2 * 8 * 12 * 1000
+
+
 def test_widths_vary_along_the_curve() -> None:
     schema = curves(LINE, [4], "linear", width=None)
     schema.CreateWidthsAttr([0.2, 0.4, 0.6, 0.8])

@@ -68,7 +68,29 @@ def test_vertex_primvars_follow_the_control_points() -> None:
     set_primvar(schema, "st", [tuple(map(float, p)) for p in grid.reshape(-1, 2)], "vertex", "texCoord2f[]")
     mesh = read(schema).mesh
     np.testing.assert_allclose(mesh.uvs["st"], mesh.points[:, :2], atol=1e-6)
-    assert len(mesh.points) == 81 and (mesh.normals == (0, 0, 1)).all()
+    assert len(mesh.points) == 33**2 and (mesh.normals == (0, 0, 1)).all()
+
+
+def test_varying_primvars_are_bilinear_in_each_span() -> None:
+    """A flat patch whose points are its parameters, of two spans along u and one along v."""
+    u, v = np.array([0.0, 0.25, 0.75, 1.0]), np.array([0.0, 0.5, 1.0])  # Greville abscissae
+    points = np.stack(np.broadcast_arrays(u, v[:, None], 0.0), axis=-1)
+    schema = patch(points, (4, 3, [0, 0, 0, 0.5, 1, 1, 1]), (3, 3, [0] * 3 + [1] * 3))
+    set_primvar(schema, "st", [(0, 0), (2, 0), (1, 0), (0, 1), (2, 1), (1, 1)], "varying", "texCoord2f[]")
+    drawn = read(schema)
+    across, along, _ = drawn.mesh.points.T
+    due = np.stack([np.interp(across, [0, 0.5, 1], [0, 2, 1]), along], axis=-1)
+    np.testing.assert_allclose(drawn.mesh.uvs["st"], due, atol=1e-6)
+    assert not drawn.issues
+
+
+def test_patches_of_many_spans_are_sampled_more_coarsely() -> None:
+    count = 41
+    grid = np.stack(np.broadcast_arrays(np.arange(count), np.arange(count)[:, None], 0.0), axis=-1)
+    knots = (count, 2, [0, *range(count), count - 1])
+    trimmed = (count, 3, [0, 0, *range(count - 1), count - 2, count - 2])
+    assert len(read(patch(grid, knots, knots)).mesh.points) == count**2
+    assert len(read(patch(grid, trimmed, trimmed)).mesh.points) == (8 * (count - 2) + 1) ** 2
 
 
 def test_a_pole_has_a_normal() -> None:

@@ -21,7 +21,8 @@ if TYPE_CHECKING:  # scipy is a quarter of a second to import, and not every sta
 
 Weights: TypeAlias = "sparse.csr_array"
 
-LARGEST_DETAIL = 8
+DETAILS = (32, 16, 8, 4, 2)
+"""Samples a segment of cubic curves: the finest that the prim's budget allows."""
 
 _BASES: dict[str, tuple[int, NDArray[np.float64]]] = {
     "linear": (1, np.array([[1, -1], [0, 1]], np.float64)),

@@ -17,7 +17,7 @@ from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.view import View
 from defshade_cli.spaces import Matrix, cross, normalize, transform_directions, transform_points
 from defshade_cli.usd.curves.basis import (
-    LARGEST_DETAIL,
+    DETAILS,
     CurveSamples,
     Kind,
     Places,
@@ -41,6 +41,9 @@ _PIXELS_A_PIECE = 20.0
 _MOST_PIECES = 40.0
 _BEYOND = 1.3
 """Half widths of the image from its middle at which control points are held, so that what is out of sight is coarse."""
+
+_LINE_DETAILS, _LINE_BUDGET = DETAILS[:3], 1 << 16
+"""Samples a segment of curves without widths, and how many of a prim all but the coarsest may have."""
 
 _ACROSS = {False: np.array([-1.0, 1.0]), True: np.sin(np.linspace(-np.pi / 2, np.pi / 2, 7))}
 """Where points lie across a ribbon, from edge to edge: flat, and round."""
@@ -79,8 +82,13 @@ class Strands:
         if level == 0:
             samples = control_samples(self.kind, self.counts, len(points), self.loops)
         else:
-            samples = sample_curves(self.kind, self.counts, len(points), LARGEST_DETAIL)
+            samples = sample_curves(self.kind, self.counts, len(points), self._line_detail)
         return _polygons(_lines(samples, points, view), _ACROSS[False], self.carried)
+
+    @property
+    def _line_detail(self) -> int:
+        segments = int(self.kind.segments(self.counts).sum())
+        return next((detail for detail in _LINE_DETAILS if detail * segments <= _LINE_BUDGET), _LINE_DETAILS[-1])
 
     def _ribbons(self, widths: Primvar, points: Vectors, camera_from_object: Matrix, view: View) -> _Pieces:
         places, start = self._cut(points, view)

@@ -10,16 +10,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from defshade_cli.usd.curves.basis import LARGEST_DETAIL, CurveSamples, sample_curves
+from defshade_cli.usd.curves.basis import DETAILS, CurveSamples, sample_curves
 from defshade_cli.usd.curves.strands import Strands, laid_along
 from defshade_cli.usd.curves.tubes import ribbons, tubes
 from defshade_cli.usd.polygons.polygons import Polygons
 
 QUAD_BUDGET = 1_000_000
-"""Quads of one prim up to which its tubes are round, and its segments many; more get the next lower detail."""
+"""Quads of one prim that its tubes keep to, where three sides and two samples a segment let them."""
 
-_DETAILS = ((LARGEST_DETAIL, 12), (4, 6), (2, 3))
-"""Samples a segment of cubic curves, and sides of tubes."""
+_SIDES = (24, 16, 12, 6, 3)
+_BUDGETS = (1 << 16, 1 << 17, *[QUAD_BUDGET] * 3)
+"""Of tubes at each of DETAILS: few curves, which may be seen from near, cost little however fine they are."""
 
 
 def swept(strands: Strands) -> Polygons:
@@ -36,9 +37,13 @@ def swept(strands: Strands) -> Polygons:
 
 
 def _detailed(strands: Strands) -> tuple[CurveSamples, int]:
-    """The finest samples within the budget, and sides."""
-    for detail, sides in _DETAILS:
+    """The finest samples within the budget, and sides; ribbons, which twist, leave out the finest.
+
+    Each edge between two planes that differ is a place where a shadow map errs.
+    """
+    choices = list(zip(DETAILS, _SIDES, _BUDGETS, strict=True))
+    for detail, sides, budget in choices[strands.normals is not None :]:
         samples = sample_curves(strands.kind, strands.counts, len(strands.points), detail)
-        if samples.count * sides <= QUAD_BUDGET:
+        if samples.count * sides <= budget:
             break
     return samples, sides

@@ -7,6 +7,7 @@ Tiller, "The NURBS Book", 4.5). Control points run along U first, as Hydra and R
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -27,13 +28,16 @@ PATCH_ATTRIBUTES = (
 )
 """What is read of a NurbsPatch that may vary over time, besides primvars."""
 
-_STEPS = 8
-"""Quads along a span between two knots; one where the patch is linear and is not trimmed."""
+_STEPS = {32: 1 << 6, 16: 1 << 9}
+"""Quads along a span between two knots, of patches of up to so many spans; one where it is linear and not trimmed."""
+
+_LEAST_STEPS = 8
+"""Of patches with more."""
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class _Direction:
     """One parameter of a patch. count: control points along it.  low, high: its range."""
 
@@ -43,11 +47,22 @@ class _Direction:
     low: float
     high: float
 
-    def samples(self, *, finely: bool = False) -> Array:
-        """(M,) parameters at which the patch is sampled."""
-        knots = self.knots
-        spans = np.unique([self.low, self.high, *knots[(knots > self.low) & (knots < self.high)]])
-        steps = 1 if self.degree == 1 and not finely else _STEPS
+    @cached_property
+    def spans(self) -> Array:
+        """(S + 1,) parameters between which its S spans lie."""
+        inside = self.knots[(self.knots > self.low) & (self.knots < self.high)]
+        return np.unique([self.low, self.high, *inside])
+
+    @property
+    def by_spans(self) -> _Direction:
+        """The same parameter with a value at each end of a span, and lines between."""
+        spans = self.spans
+        return _Direction(len(spans), 1, np.concatenate([spans[:1], spans, spans[-1:]]), self.low, self.high)
+
+    def samples(self, steps: int, *, finely: bool = False) -> Array:
+        """(M,) parameters at which the patch is sampled, in so many steps a span."""
+        spans = self.spans
+        steps = 1 if self.degree == 1 and not finely else steps
         inner = spans[:-1, None] + np.diff(spans)[:, None] * (np.arange(steps) / steps)
         return np.append(inner.ravel(), self.high)
 
@@ -73,7 +88,7 @@ def read_patch(
     where = _cut(patch, u, v, time, issues)
     points, normals = _surface(control, u, v, where.at)
     left_handed = patch.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
-    elements = {"constant": 1, "uniform": 1, "vertex": u.count * v.count}
+    elements = {"constant": 1, "uniform": 1, "vertex": u.count * v.count, "varying": len(u.spans) * len(v.spans)}
     surface = replace(
         _polygons(points, -normals if left_handed else normals, where.corners),
         left_handed=left_handed,
@@ -84,16 +99,18 @@ def read_patch(
 
 def _cut(patch: UsdGeom.NurbsPatch, u: _Direction, v: _Direction, time: Usd.TimeCode, issues: list[str]) -> _Cut:
     """The whole patch in quads, or in triangles what is inside its trim curves."""
+    spans = (len(u.spans) - 1) * (len(v.spans) - 1)
+    steps = next((steps for steps, most in _STEPS.items() if spans <= most), _LEAST_STEPS)
     if patch.GetTrimCurveCountsAttr().Get(time):
         try:
-            cut = _Cut(*inside(read_loops(patch, time), u.samples(finely=True), v.samples(finely=True)))
+            cut = _Cut(*inside(read_loops(patch, time), u.samples(steps, finely=True), v.samples(steps, finely=True)))
         except ValueError as error:
             issues.append(f"trim curves are ignored: {error}")
         else:
             if not len(cut.corners):
                 issues.append("its trim curves leave nothing of it")
             return cut
-    us, vs = u.samples(), v.samples()
+    us, vs = u.samples(steps), v.samples(steps)
     first = (np.arange(len(vs) - 1)[:, None] * len(us) + np.arange(len(us) - 1)).ravel()
     corners = np.stack([first, first + 1, first + len(us) + 1, first + len(us)], axis=1)
     return _Cut(np.stack(np.meshgrid(us, vs), axis=-1).reshape(-1, 2), corners)
@@ -156,8 +173,10 @@ def _polygons(points: Array, normals: Array, corners: NDArray[np.integer]) -> Po
 
 
 def _sampled(primvar: Primvar, u: _Direction, v: _Direction, at: Array) -> Primvar:
-    """A primvar of the control points on the surface; `vertex` values weigh as polynomials do."""
-    if primvar.interpolation != "vertex":
+    """A primvar on the surface: `vertex` values weigh as polynomials do, `varying` ones are bilinear in each span."""
+    if primvar.interpolation == "varying":
+        u, v = u.by_spans, v.by_spans
+    elif primvar.interpolation != "vertex":
         return primvar
     grid = primvar.values.reshape(v.count, u.count, *primvar.values.shape[1:]).astype(np.float64)
-    return replace(primvar, values=_evaluated(grid, u, v, at).astype(np.float32))
+    return replace(primvar, values=_evaluated(grid, u, v, at).astype(np.float32), interpolation="vertex")
