@@ -218,6 +218,7 @@ def test_normals_turn_with_their_joint() -> None:
 def test_nothing_is_skinned_outside_a_skel_root() -> None:
     scene = read(rig(animation("anim", (0, 90)) + triangle(interpolation="vertex"), "anim", kind="Xform"))
     np.testing.assert_allclose(world_points(scene)["/rig/mesh"][0], (0, 2, 0))
+    assert scene.unsupported == (), "baked stages keep their influences"
 
 
 # Instances
@@ -304,6 +305,8 @@ def test_normal_offsets_turn_normals() -> None:
         ("jointIndices = [1, 1, 1]", "jointIndices = [1, 1]", "its joint influences have no values"),
         ("jointWeights = [1, 1, 1]", "jointWeights = [1, nan, 1]", "its joint weights are not finite"),
         ("uniform matrix4d[] bindTransforms", "uniform matrix4d[] other", "its skeleton has no bind or rest pose"),
+        ('"mesh" (prepend apiSchemas = ["SkelBindingAPI"])', '"mesh"', "SkelBindingAPI is not applied to it"),
+        ("rel skel:skeleton = <../skeleton>", "", "no skeleton is bound to it"),
     ],
 )
 def test_a_broken_binding_leaves_the_restshape(before: str, after: str, reason: str) -> None:
@@ -312,6 +315,15 @@ def test_a_broken_binding_leaves_the_restshape(before: str, after: str, reason: 
     scene = read(text.replace(before, after))
     np.testing.assert_allclose(world_points(scene)["/rig/mesh"][0], (0, 2, 0))
     assert reasons(scene, "/rig/mesh") == [f"drawn in its rest shape: {reason}"]
+
+
+@pytest.mark.parametrize(("interpolation", "before"), [("vertex", "half3[] scales"), ("constant", "quatf[] rotations")])
+def test_an_animation_that_lacks_some_leaves_the_rest_pose(interpolation: str, before: str) -> None:
+    text = rig(animation("anim", (0, 90)) + triangle(interpolation=interpolation), "anim")
+    scene = read(text.replace(before, before.replace("] ", "] other")))
+    np.testing.assert_allclose(world_points(scene)["/rig/mesh"][0], (0, 2, 0))
+    reason = "its animation lacks translations, rotations or scales of all its joints"
+    assert reasons(scene, "/rig/mesh") == [f"in the rest pose of its skeleton: {reason}"]
 
 
 def test_a_blend_shape_that_does_not_fit_is_left_out() -> None:

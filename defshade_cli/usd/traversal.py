@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from defshade_cli.usd.skel import Rig
 
 _VISIBILITY, _PURPOSE = str(UsdGeom.Tokens.visibility), str(UsdGeom.Tokens.purpose)
+_JOINTS = "primvars:skel:jointIndices"
 _XFORM_OPS = str(UsdGeom.Tokens.xformOpOrder)
 
 _PROTOTYPE_CHILDREN = Usd.PrimIsActive & Usd.PrimIsLoaded
@@ -208,6 +209,8 @@ class Traversal:
         return None if light is None else self._piece(prim, here, light)
 
     def _gprim(self, prim: Usd.Prim, here: Standing, said: Said) -> Piece | _Awaited | None:
+        if here.rig and _JOINTS in said.names:
+            self._check_joints(prim, here)
         if self._is_at_frame and self._memory.is_unknown_mesh(said):
             return _Awaited(prim, said, here, len(self.issues))
         surface = self._memory.surface_around(prim, self._time, self._base, said)
@@ -217,6 +220,12 @@ class Traversal:
         piece, issues = self._standing_piece(prim, here, surface)
         self.issues.update(dict.fromkeys(issues))
         return piece
+
+    def _check_joints(self, prim: Usd.Prim, here: Standing) -> None:
+        from defshade_cli.usd.skel import why_unbent
+
+        if reason := why_unbent(here.on_stage(prim)):
+            self._report(prim, f"drawn in its rest shape: {reason}")
 
     def _standing_piece(
         self, prim: Usd.Prim, here: Standing, surface: Surface

@@ -7,7 +7,7 @@ rest Surface ── blendshapes ── skinning ──→ Surface
 USD resolves bindings, orders of joints and poses, which are few; points are deformed here, in NumPy.
 """
 
-from defshade_cli.usd.skel.binding import Rig, Rigs
+from defshade_cli.usd.skel.binding import Rig, Rigs, why_unbent
 from defshade_cli.usd.skel.deformer import Deformer
 
-__all__ = ["Deformer", "Rig", "Rigs"]
+__all__ = ["Deformer", "Rig", "Rigs", "why_unbent"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,15 @@ class Animation:
         self._joints = _places(skinning.GetJointOrder() or order, order)
         shapes = skinning.GetBlendShapeOrder() or () if skinning.HasBlendShapes() else ()
         self._shapes = _places(shapes, self._source.GetBlendShapeOrder() if self._source else ())
+
+    @cached_property
+    def issue(self) -> str | None:
+        """What is wrong with it, so that the skeleton stays in its rest pose."""
+        source = self._source
+        if not (source and self._skinning.HasJointInfluences() and source.GetJointOrder()):
+            return None
+        posed = source.ComputeJointLocalTransforms(Usd.TimeCode.EarliestTime())
+        return None if posed else "its animation lacks translations, rotations or scales of all its joints"
 
     @property
     def joint_count(self) -> int:

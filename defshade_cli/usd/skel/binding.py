@@ -27,6 +27,16 @@ class Rig(NamedTuple):
         return (rig_from_skeleton, True) if resets else (rig_from_skeleton * self.root_from_rig, self.in_world)
 
 
+def why_unbent(prim: Usd.Prim) -> str | None:
+    """Why the joints that influence a prim below a SkelRoot, as it says, do not move it; None where they may.
+
+    prim: on the stage, or the proxy of one in a prototype.
+    """
+    if not prim.HasAPI(UsdSkel.BindingAPI):
+        return "SkelBindingAPI is not applied to it"
+    return None if UsdSkel.BindingAPI(prim).GetInheritedSkeleton() else "no skeleton is bound to it"
+
+
 class Rigs:
     """The skinned prims of a stage. Skinning is enabled below SkelRoots only, as their schema says."""
 

@@ -84,10 +84,14 @@ class Deformer:
             body = body_of(rest)
             polygons, issues = self._moulded(body, pose)
             polygons = bent(polygons, *_of_rows(skin, body.rows)) if skin else polygons
-            return self._renamed(with_body(rest, polygons), issues)
+            return self._renamed(with_body(rest, polygons), issues + self._of_animation)
 
         bind = skin[2].tobytes() if skin else b""
         return self._surface.of((rest, pose.key, skin and skin[1], bind), deform)
+
+    @property
+    def _of_animation(self) -> tuple[str, ...]:
+        return (f"in the rest pose of its skeleton: {issue}",) if (issue := self._animation.issue) else ()
 
     def _moulded(self, body: Body, pose: Pose) -> tuple[Polygons, tuple[str, ...]]:
         if not (self._bends and self._skinning.HasBlendShapes()):
