@@ -139,13 +139,14 @@ def test_temperature_multiplies_the_color_where_enabled() -> None:
 # Shaping
 
 
-def test_shaping_counts_where_its_api_is_applied() -> None:
+@pytest.mark.parametrize("api", ["", "ShapingAPI"])
+def test_shaping_counts_whether_or_not_its_api_is_applied(api: str) -> None:
     body = """float inputs:shaping:focus = 2
         color3f inputs:shaping:focusTint = (0, 0.5, 1)
         float inputs:shaping:cone:angle = 30
         float inputs:shaping:cone:softness = 0.25"""
-    assert light("SphereLight", body).shaping is None
-    assert light("SphereLight", body, "ShapingAPI").shaping == Shaping(2, (0, 0.5, 1), 30, 0.25)
+    assert light("SphereLight", body, api).shaping == Shaping(2, (0, 0.5, 1), 30, 0.25)
+    assert light("SphereLight", "float inputs:shaping:focus = 2", api).shaping == Shaping(2)
 
 
 def test_shaping_has_the_schemas_defaults_and_ranges() -> None:
@@ -192,6 +193,11 @@ def test_invisible_lights_are_off_and_purposes_do_not_matter() -> None:
 # What is left out
 
 
+def test_a_shape_that_glows_has_sizes_of_its_own() -> None:
+    scene = read('def Sphere "light" (prepend apiSchemas = ["LightAPI"]) {\ndouble radius = 2\n}')
+    assert reasons(scene, "/light") == []
+
+
 def test_other_kinds_are_reported() -> None:
     scene = read('def PluginLight "light" {\n}\ndef SphereLight "bulb" {\n}')
     assert [found.path for found in scene.lights] == ["/bulb"]
@@ -212,6 +218,10 @@ def test_portals_are_hints() -> None:
         ("rel light:filters = </cube>", "light filters are ignored"),
         ("asset inputs:texture:file = @sky.png@", "the texture sky.png is ignored: there is no such file"),
         ("asset inputs:shaping:ies:file = @lamp.ies@", "the profile lamp.ies is ignored: there is no such file"),
+        (
+            "float intensity = 30\ncolor3f color = (1, 0, 0)\ncolor3f inputs:color = (0, 1, 0)",
+            "not read, since they lack the inputs: that they have since USD 21.02: intensity",
+        ),
         ("color3f inputs:color.connect = </shader.outputs:rgb>", "connections are ignored: inputs:color"),
     ],
 )

@@ -68,7 +68,7 @@ def test_the_falloff_is_no_deeper_than_the_distance() -> None:
     assert ShadowStyle(falloff=3.0).fading == PLAIN.fading == 0.0
 
 
-def test_styles_are_read_where_the_api_is_applied(pipeline: Pipeline) -> None:
+def test_styles_are_read_whether_or_not_the_api_is_applied(pipeline: Pipeline) -> None:
     body = """color3f inputs:shadow:color = (0.25, 0, 1)
         float inputs:shadow:distance = 3
         float inputs:shadow:falloff = 2
@@ -87,7 +87,8 @@ def test_styles_are_read_where_the_api_is_applied(pipeline: Pipeline) -> None:
     """
     styled, plain, fallback = read(text).lights
     assert (styled.shadow, styled.casts_shadow) == (ShadowStyle((0.25, 0, 1), 3, 2, 0.5), False)
-    assert (plain.shadow, plain.casts_shadow) == (fallback.shadow, fallback.casts_shadow) == (PLAIN, True)
+    assert (plain.shadow, plain.casts_shadow) == (styled.shadow, styled.casts_shadow)
+    assert (fallback.shadow, fallback.casts_shadow) == (PLAIN, True)
 
 
 def test_plain_shadows_pay_nothing(pipeline: Pipeline) -> None:

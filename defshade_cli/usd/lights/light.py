@@ -54,6 +54,9 @@ _GROUP_ATTRIBUTES = (
 )
 """A light's group: ours, since UsdLux has none, then RenderMan's, Arnold's and Karma's."""
 
+_APIS = {"shaping": "ShapingAPI", "shadow": "ShadowAPI"}
+"""By the namespace of their inputs. What is authored there counts also where the schema is not applied, as in Hydra."""
+
 _INPUTS = "inputs:"
 _WHITE = np.array(UsdLux.BlackbodyTemperatureAsRgb(6500.0))
 
@@ -113,11 +116,16 @@ def _common(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any]:
     color = np.array(in_rec709(prim.GetAttribute("inputs:color"), _input(prim, "color", time)), np.float64)
     if _input(prim, "enableColorTemperature", time):
         color = color * temperature_color(_input(prim, "colorTemperature", time))
-    has_shadow = prim.HasAPI(UsdLux.ShadowAPI)
+    has_shadow = _says(prim, "shadow")
     shadow = {"casts_shadow": _input(prim, "shadow:enable", time), "shadow": _shadow(prim, time)} if has_shadow else {}
     values = {name: _input(prim, name, time) for name in ("intensity", "exposure", "normalize", "diffuse", "specular")}
-    shaping = _shaping(prim, time) if prim.HasAPI(UsdLux.ShapingAPI) else None
+    shaping = _shaping(prim, time) if _says(prim, "shaping") else None
     return {"color": color, "shaping": shaping, "group": _group(prim)} | shadow | values
+
+
+def _says(prim: Usd.Prim, namespace: str) -> bool:
+    """Whether one of _APIS is applied, or something of it authored."""
+    return prim.HasAPI(_APIS[namespace]) or bool(prim.GetAuthoredPropertiesInNamespace(_INPUTS + namespace))
 
 
 def _group(prim: Usd.Prim) -> str:
@@ -149,6 +157,8 @@ def _shaping(prim: Usd.Prim, time: Usd.TimeCode) -> Shaping:
 def _left_out(prim: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
     if UsdLux.LightAPI(prim).GetFiltersRel().GetForwardedTargets():
         yield "light filters are ignored"
+    if old := _of_old(prim):
+        yield f"not read, since they lack the inputs: that they have since USD 21.02: {', '.join(old)}"
     connected = [attr.GetName() for attr in prim.GetAuthoredAttributes() if attr.HasAuthoredConnections()]
     if connected:
         yield f"connections are ignored: {', '.join(connected)}"
@@ -158,6 +168,12 @@ def _left_out(prim: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
     yield from mistyped(prim)
 
 
+def _of_old(prim: Usd.Prim) -> list[str]:
+    """Inputs under the names that they had before version 21.02, and under no others."""
+    names, known = prim.GetAuthoredPropertyNames(), set(prim.GetPrimDefinition().GetPropertyNames())
+    return [name for name in names if name not in known and _INPUTS + name in known.difference(names)]
+
+
 def _input(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Any:
     """Value of `inputs:name`, or the schema's fallback, also for what is not finite or of another type.
 
@@ -165,5 +181,7 @@ def _input(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Any:
     """
     attribute = prim.GetAttribute(_INPUTS + name)
     value = attribute.Get(time) if attribute else None
-    fallback = prim.GetPrimDefinition().GetAttributeFallbackValue(_INPUTS + name)
+    api = _APIS.get(name.partition(":")[0])
+    definition = Usd.SchemaRegistry().FindAppliedAPIPrimDefinition(api) if api else prim.GetPrimDefinition()
+    fallback = definition.GetAttributeFallbackValue(_INPUTS + name)
     return value if is_finite(value) and (fallback is None or resembles(value, fallback)) else fallback
