@@ -10,10 +10,9 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from defshade_cli.usd.polygons.end_to_end import blocks, lay_bare, starts_of
-from defshade_cli.usd.polygons.lying import Lying, carried
+from defshade_cli.usd.polygons.end_to_end import blocks, each_finite, each_greatest, lay_bare
+from defshade_cli.usd.polygons.lying import are_as_many, are_sound, carried
 from defshade_cli.usd.polygons.normals import unit_normals
 from defshade_cli.usd.polygons.polygons import Interpolation, Polygons, Primvar
 from defshade_cli.usd.polygons.primvars import NOTHING_CARRIED, count_elements
@@ -26,7 +25,7 @@ def check_all(meshes: Sequence[Told]) -> list[Polygons | None]:
     sound -= {number for number in sound if not _fits(meshes[number])}
     lying = [(number, each) for number in sound for each in meshes[number].lying]
     sound -= {
-        number for (number, _), fine in zip(lying, _are_sound([each for _, each in lying]), strict=True) if not fine
+        number for (number, _), fine in zip(lying, are_sound([each for _, each in lying]), strict=True) if not fine
     }
     with_normals = [number for number in sound if meshes[number].normals]
     normals = _unit_normals({number: meshes[number] for number in with_normals})
@@ -38,11 +37,11 @@ def _are_drawn(meshes: Sequence[Told]) -> list[bool]:
     """Are all corners at points that exist, all points finite, and all holes faces?"""
     if not meshes:
         return []
-    within = _greatest([mesh.indices for mesh in meshes]) < [len(mesh.points) for mesh in meshes]
-    sound = within & _are_finite([mesh.points for mesh in meshes])
+    within = each_greatest([mesh.indices for mesh in meshes]) < [len(mesh.points) for mesh in meshes]
+    sound = within & each_finite([mesh.points for mesh in meshes])
     holed = [number for number, mesh in enumerate(meshes) if len(mesh.holes)]
     if holed:
-        sound[holed] &= _greatest([meshes[n].holes for n in holed]) < [len(meshes[n].counts) for n in holed]
+        sound[holed] &= each_greatest([meshes[n].holes for n in holed]) < [len(meshes[n].counts) for n in holed]
     return sound.tolist()
 
 
@@ -51,30 +50,7 @@ def _fits(mesh: Told) -> bool:
     if not mesh.lying:
         return True
     due = count_elements(len(mesh.counts), len(mesh.points), len(mesh.indices))
-    return all(each.size == due.get(each.interpolation, 0) for each in mesh.lying)
-
-
-def _are_sound(lying: Sequence[Lying]) -> list[bool]:
-    """Are all values finite, and all indices at one of them? None is empty."""
-    if not lying:
-        return []
-    sound = _are_finite([each.values for each in lying])
-    indexed = [number for number, each in enumerate(lying) if each.indices is not None]
-    if indexed:
-        greatest = _greatest([each.indices for each in lying if each.indices is not None])
-        sound[indexed] &= greatest < [len(lying[number].values) for number in indexed]
-    return sound.tolist()
-
-
-def _greatest(indices: Sequence[NDArray[np.integer]]) -> NDArray[np.uint32]:
-    """(M,) of each array, where what is negative counts as large."""
-    return np.maximum.reduceat(np.concatenate(indices).view(np.uint32), starts_of(indices))
-
-
-def _are_finite(values: Sequence[NDArray[np.float32]]) -> NDArray[np.bool_]:
-    """(M,) whether each array is finite everywhere."""
-    flat = [each.reshape(-1) for each in values]
-    return np.logical_and.reduceat(np.isfinite(np.concatenate(flat)), starts_of(flat))
+    return are_as_many(mesh.lying, due)
 
 
 def _unit_normals(meshes: Mapping[int, Told]) -> dict[int, Primvar]:

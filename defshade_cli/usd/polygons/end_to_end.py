@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.usd.polygons.polygons import Interpolation, Polygons, Primvar, Scheme, varying
+from defshade_cli.usd.values import are_finite
 
 T = TypeVar("T")
 
@@ -21,6 +22,9 @@ LARGEST = 1 << 12
 """Corners of a mesh that is small."""
 
 CORNERS_AT_ONCE = 1 << 18
+
+_FEW = 8
+"""Arrays that are looked at as fast one by one."""
 
 
 class Faceted(Protocol):
@@ -84,6 +88,20 @@ def signature(mesh: Polygons) -> Hashable:
 def starts_of(arrays: Iterable[NDArray[Any]]) -> NDArray[np.intp]:
     """(M,) where each begins when they stand end to end."""
     return np.cumsum([0, *map(len, arrays)])[:-1]
+
+
+def each_greatest(indices: Sequence[NDArray[np.integer]]) -> NDArray[np.uint32]:
+    """(M,) of each array of int32, where what is negative counts as large. None is empty."""
+    return np.maximum.reduceat(np.concatenate(indices).view(np.uint32), starts_of(indices))
+
+
+def each_finite(values: Sequence[NDArray[np.float32]]) -> list[bool]:
+    """Whether each array (N, ...) is finite everywhere. None is empty."""
+    if len(values) <= _FEW:
+        return [are_finite(each) for each in values]
+    flat = [each.reshape(-1) for each in values]
+    finite: list[bool] = np.logical_and.reduceat(np.isfinite(np.concatenate(flat)), starts_of(flat)).tolist()
+    return finite
 
 
 def blocks(items: Sequence[T], corners: Sequence[int], at_once: int = CORNERS_AT_ONCE) -> Iterator[Sequence[T]]:

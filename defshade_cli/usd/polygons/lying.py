@@ -5,7 +5,7 @@ Of what is common nothing needs to be said, if it is sound. Where there is more 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pxr import Usd, Vt
 
 from defshade_cli.usd.color_space import in_rec709, is_color
+from defshade_cli.usd.polygons.end_to_end import each_finite, each_greatest
 from defshade_cli.usd.polygons.polygons import Interpolation, Primvar
 from defshade_cli.usd.polygons.primvars import Carried, Elements, uv_width
 from defshade_cli.usd.said import Inherited, Said
@@ -69,20 +70,37 @@ def told_normals(said: Said, time: Usd.TimeCode) -> Lying | None:
 def sound_carried(said: Said, time: Usd.TimeCode, color: str, elements: Elements) -> Carried | None:
     """Colour, opacity and texture coordinates of a surface; None where something of them needs to be said."""
     lying = told_carried(said, time, color)
-    return carried(lying) if lying is not None and all(_is_sound(each, elements) for each in lying) else None
+    if lying is None or not are_as_many(lying, elements) or not all(are_sound(lying)):
+        return None
+    return carried(lying)
 
 
 def carried(lying: Iterable[Lying]) -> Carried:
     """Of what is sound."""
-    others = {each.field: each.primvar for each in lying if each.field != "uvs"}
-    uvs = {each.name: each.primvar for each in lying if each.field == "uvs"}
+    uvs: dict[str, Primvar] = {}
+    others: dict[str, Primvar] = {}
+    for each in lying:
+        if each.field == "uvs":
+            uvs[each.name] = each.primvar
+        else:
+            others[each.field] = each.primvar
     return Carried(others.get("display_color"), others.get("display_opacity"), uvs)
 
 
-def _is_sound(lying: Lying, elements: Elements) -> bool:
-    if lying.size != elements.get(lying.interpolation, 0) or not are_finite(lying.values):
-        return False
-    return lying.indices is None or bool(lying.indices.view(np.uint32).max() < len(lying.values))
+def are_as_many(lying: Iterable[Lying], elements: Elements) -> bool:
+    """Has each as many values as it needs?"""
+    return not any(each.size != elements.get(each.interpolation, 0) for each in lying)
+
+
+def are_sound(lying: Sequence[Lying]) -> list[bool]:
+    """Are all values of each finite, and all indices at one of them? None is empty."""
+    sound = each_finite([each.values for each in lying])
+    indexed = [number for number, each in enumerate(lying) if each.indices is not None]
+    if indexed:
+        greatest = each_greatest([each.indices for each in lying if each.indices is not None]).tolist()
+        for number, last in zip(indexed, greatest, strict=True):
+            sound[number] &= last < len(lying[number].values)
+    return sound
 
 
 def told_carried(said: Said, time: Usd.TimeCode, color: str) -> tuple[Lying, ...] | None:
