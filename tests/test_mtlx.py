@@ -76,6 +76,57 @@ def test_a_document_is_read_in_place_of_its_reference(
     np.testing.assert_allclose(found.emissive_color, 0.21404, atol=1e-5)
 
 
+def test_a_document_may_be_a_sublayer(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    pytest.importorskip("MaterialX")
+    stage = with_document(tmp_path)
+    cube = f'def Cube "cube" {BINDS} {{\nrel material:binding = </MaterialX/Materials/Wood>\n}}'
+    stage.write_text(f"#usda 1.0\n(\nsubLayers = [@./look.mtlx@]\n)\n{cube}")
+    scene = read_stage(stage)
+    assert (scene.materials[0].roughness, scene.unsupported, caplog.text) == (0.75, (), "")
+
+
+DEFINED = """<?xml version="1.0"?>
+<materialx version="1.38">
+  <nodedef name="ND_dimmed" node="dimmed">
+    <input name="color" type="color3" value="1, 1, 1" />
+    <input name="by" type="float" value="0.5" />
+    <output name="out" type="color3" />
+  </nodedef>
+  <nodegraph name="NG_dimmed" nodedef="ND_dimmed">
+    <multiply name="product" type="color3">
+      <input name="in1" type="color3" interfacename="color" />
+      <input name="in2" type="float" interfacename="by" />
+    </multiply>
+    <output name="out" type="color3" nodename="product" />
+  </nodegraph>
+  <nodedef name="ND_paint" node="paint">
+    <input name="color" type="color3" value="0.2, 0.4, 0.8" />
+    <output name="out" type="surfaceshader" />
+  </nodedef>
+  <nodegraph name="NG_paint" nodedef="ND_paint">
+    <dimmed name="dim" type="color3"><input name="color" type="color3" interfacename="color" /></dimmed>
+    <dimmed name="dimmer" type="color3">
+      <input name="color" type="color3" nodename="dim" />
+      <input name="by" type="float" value="0.25" />
+    </dimmed>
+    <gltf_pbr name="pbr" type="surfaceshader"><input name="base_color" type="color3" nodename="dimmer" /></gltf_pbr>
+    <output name="out" type="surfaceshader" nodename="pbr" />
+  </nodegraph>
+  <paint name="coat" type="surfaceshader"><input name="color" type="color3" value="0.8, 0.4, 0.8" /></paint>
+  <surfacematerial name="Wood" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="coat" />
+  </surfacematerial>
+</materialx>
+"""
+
+
+def test_nodes_that_the_document_defines_are_the_graphs_that_they_stand_for(tmp_path: Path) -> None:
+    pytest.importorskip("MaterialX")
+    scene = read_stage(with_document(tmp_path, DEFINED))
+    assert scene.unsupported == ()
+    np.testing.assert_allclose(scene.materials[0].diffuse_color, (0.1, 0.05, 0.1), rtol=1e-6)
+
+
 def test_the_files_on_disk_stay_as_they_are(tmp_path: Path) -> None:
     stage = with_document(tmp_path)
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}

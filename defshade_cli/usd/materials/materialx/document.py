@@ -101,6 +101,8 @@ class _Writer:
         if path in self._written:
             return path
         self._written.add(path)
+        if graph := _implementing(node):
+            return self._expand(node, graph, path, parent)
         prim = _define(self._layer, path, "Shader")
         surface = node.getType() == _SURFACE
         identifier = Sdf.AttributeSpec(prim, "info:id", Sdf.ValueTypeNames.Token, Sdf.VariabilityUniform)
@@ -110,6 +112,13 @@ class _Writer:
         for name, kind in _outputs(node).items():
             self._output(path, "surface" if surface else name, kind)
         return path
+
+    def _expand(self, node: mx.Node, graph: mx.NodeGraph, path: Sdf.Path, parent: Sdf.Path) -> Sdf.Path:
+        """A node that a graph of the document defines, as that graph with the node's inputs for its interface."""
+        _define(self._layer, path, "NodeGraph")
+        for found in (*node.getNodeDef().getActiveInputs(), *node.getInputs()):
+            self._input(found, path, parent)
+        return self._with_outputs(graph, path)
 
     def _input(self, found: mx.Input, path: Sdf.Path, parent: Sdf.Path) -> None:
         attribute = _attribute(self._layer.GetPrimAtPath(path), f"inputs:{found.getName()}", found.getType())
@@ -132,7 +141,7 @@ class _Writer:
         node = found.getConnectedNode()
         if node is None:
             return None
-        output = found.getOutputString() or next(iter(_outputs(node)))
+        output = "surface" if node.getType() == _SURFACE else found.getOutputString() or next(iter(_outputs(node)))
         return self._node(node, parent).AppendProperty(f"outputs:{output}")
 
     def _graph(self, graph: mx.NodeGraph) -> Sdf.Path:
@@ -143,9 +152,13 @@ class _Writer:
         _define(self._layer, path, "NodeGraph")
         for found in graph.getInputs():
             self._input(found, path, self._root)
+        return self._with_outputs(graph, path)
+
+    def _with_outputs(self, graph: mx.NodeGraph, path: Sdf.Path) -> Sdf.Path:
         for output in graph.getOutputs():
             source = self._source(output, path)
-            attribute = self._output(path, output.getName(), output.getType())
+            kind = output.getType()
+            attribute = self._output(path, "surface" if kind == _SURFACE else output.getName(), kind)
             if source is not None:
                 self._connect(attribute, source)
         return path
@@ -176,6 +189,13 @@ def _attribute(prim: Sdf.PrimSpec, name: str, kind: str) -> Sdf.AttributeSpec:
 
 def _name(element: mx.Element) -> str:
     return str(Tf.MakeValidIdentifier(element.getName()))
+
+
+def _implementing(node: mx.Node) -> mx.NodeGraph | None:
+    """The graph of the document that defines a node, if one does: MaterialX's own library is not read."""
+    definition = node.getNodeDef()
+    implementation = definition.getImplementation() if definition else None
+    return implementation if implementation and implementation.getCategory() == "nodegraph" else None
 
 
 def _outputs(node: mx.Node) -> dict[str, str]:

@@ -12,10 +12,17 @@ from defshade_cli.usd.materials.materialx.graph import Evaluate, Graph, Unread
 from defshade_cli.usd.materials.materialx.signal import NonLinear, Signal, Values, by_values, constant, joined, mixed
 
 _CHANNEL_NAMES = {"r": 0, "g": 1, "b": 2, "a": 3, "x": 0, "y": 1, "z": 2, "w": 3}
+_NO_COLOR = (0.0, 0.0, 0.0)
+_LUMA = (0.2722287, 0.6740818, 0.0536895)
+"""The nodes' own default, luminance in ACEScg."""
+
 _BLACK, _WHITE = constant(0.0), constant(1.0)
 
 
-def _arithmetic(function: Callable[..., Signal], **inputs: float) -> Evaluate:
+Default = float | tuple[float, ...]
+
+
+def _arithmetic(function: Callable[..., Signal], **inputs: Default) -> Evaluate:
     """A node that is a function of its inputs, named with their defaults."""
 
     def evaluate(graph: Graph, node: UsdShade.Shader, _: str, width: int) -> Signal:
@@ -25,7 +32,7 @@ def _arithmetic(function: Callable[..., Signal], **inputs: float) -> Evaluate:
     return evaluate
 
 
-def _of_values(function: Callable[..., Values], **inputs: float) -> Evaluate:
+def _of_values(function: Callable[..., Values], **inputs: Default) -> Evaluate:
     """A node that is no linear function: computed for constants alone."""
     return _arithmetic(lambda *operands: by_values(function, *operands), **inputs)
 
@@ -119,6 +126,41 @@ def _range(graph: Graph, node: UsdShade.Shader, _: str, width: int) -> Signal:
     return _remap(graph.signal(node, "in", 0.0), *(graph.signal(node, n, d) for n, d in names.items())).widened(width)
 
 
+def _luminance(value: Values, coefficients: Values) -> Values:
+    return np.full_like(value, np.dot(value[:3], coefficients[:3]))
+
+
+def _saturated(value: Values, amount: Values, coefficients: Values) -> Values:
+    gray = _luminance(value, coefficients)
+    return gray + (value - gray) * amount
+
+
+def _smooth(value: Values, low: Values, high: Values) -> Values:
+    t = np.clip((value - low) / (high - low), 0.0, 1.0)
+    return t * t * (3.0 - 2.0 * t)
+
+
+def _from_hsv(value: Values) -> Values:
+    """The six ramps of hue between which saturation and value draw."""
+    hue, saturation, brightness = value[:3]
+    ramps = np.clip(np.abs((6.0 * hue + np.array([0.0, 4.0, 2.0])) % 6.0 - 3.0) - 1.0, 0.0, 1.0)
+    return brightness * (1.0 + saturation * (ramps - 1.0))
+
+
+def _to_hsv(value: Values) -> Values:
+    most, spread = value[:3].max(), np.ptp(value[:3])
+    if spread == 0.0:
+        return np.array([0.0, 0.0, most])
+    largest = int(value[:3].argmax())
+    hue = (2.0 * largest + (value[(largest + 1) % 3] - value[(largest + 2) % 3]) / spread) / 6.0
+    return np.array([hue % 1.0, spread / most, most])
+
+
+def _blended(operation: Callable[[Signal, Signal], Signal]) -> Evaluate:
+    """A compositing node: as much of the operation, over the background, as `mix` says."""
+    return _arithmetic(lambda bg, fg, amount: mixed(bg, operation(bg, fg), amount), bg=0.0, fg=0.0, mix=1.0)
+
+
 NODES: dict[str, Evaluate] = {
     "image": images.image,
     "tiledimage": images.tiled_image,
@@ -149,6 +191,23 @@ NODES: dict[str, Evaluate] = {
     "mix": _arithmetic(mixed, bg=0.0, fg=0.0, mix=0.0),
     "dot": _arithmetic(lambda value: value, **{"in": 0.0}),
     "remap": _arithmetic(_remap, **{"in": 0.0}, inlow=0.0, inhigh=1.0, outlow=0.0, outhigh=1.0),
+    "contrast": _arithmetic(
+        lambda value, by, pivot: (value - pivot) * by + pivot, **{"in": 0.0}, amount=1.0, pivot=0.5
+    ),
+    "plus": _blended(lambda bg, fg: bg + fg),
+    "minus": _blended(lambda bg, fg: bg - fg),
+    "screen": _blended(lambda bg, fg: bg + fg - bg * fg),
+    "luminance": _of_values(_luminance, **{"in": 0.0}, lumacoeffs=_LUMA),
+    "saturate": _of_values(_saturated, **{"in": 0.0}, amount=1.0, lumacoeffs=_LUMA),
+    "smoothstep": _of_values(_smooth, **{"in": 0.0}, low=0.0, high=1.0),
+    "hsvtorgb": _of_values(_from_hsv, **{"in": _NO_COLOR}),
+    "rgbtohsv": _of_values(_to_hsv, **{"in": _NO_COLOR}),
+    "floor": _of_values(np.floor, **{"in": 0.0}),
+    "ceil": _of_values(np.ceil, **{"in": 0.0}),
+    "round": _of_values(np.round, **{"in": 0.0}),
+    "sign": _of_values(np.sign, **{"in": 0.0}),
+    "ln": _of_values(np.log, **{"in": 1.0}),
+    "tan": _of_values(np.tan, **{"in": 0.0}),
     "power": _of_values(np.power, in1=0.0, in2=1.0),
     "min": _of_values(np.minimum, in1=0.0, in2=0.0),
     "max": _of_values(np.maximum, in1=0.0, in2=0.0),

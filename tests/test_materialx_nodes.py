@@ -1,0 +1,66 @@
+"""MaterialX nodes that adjust and blend colours, by the formulas of its specification."""
+
+from __future__ import annotations
+
+import colorsys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from test_materialx import GLTF, WOOD, node, read
+
+RED = (0.5, 0.2, 0.1)
+GRAY = float(np.dot(RED, (0.2722287, 0.6740818, 0.0536895)))
+
+
+@pytest.mark.parametrize(
+    ("identifier", "inputs", "color"),
+    [
+        ("ND_luminance_color3", f"color3f inputs:in = {RED}", (GRAY,) * 3),
+        ("ND_luminance_color3", f"color3f inputs:in = {RED}\ncolor3f inputs:lumacoeffs = (0, 1, 0)", (0.2,) * 3),
+        ("ND_saturate_color3", f"color3f inputs:in = {RED}\nfloat inputs:amount = 0", (GRAY,) * 3),
+        ("ND_saturate_color3", f"color3f inputs:in = {RED}", RED),
+        ("ND_contrast_color3FA", f"color3f inputs:in = {RED}\nfloat inputs:amount = 0.5", (0.5, 0.35, 0.3)),
+        ("ND_smoothstep_color3FA", f"color3f inputs:in = {RED}\nfloat inputs:high = 0.4", (1, 0.5, 0.15625)),
+        ("ND_hsvtorgb_color3", "color3f inputs:in = (0.4, 0.7, 0.9)", colorsys.hsv_to_rgb(0.4, 0.7, 0.9)),
+        ("ND_hsvtorgb_color3", "color3f inputs:in = (-0.1, 0.7, 0.9)", colorsys.hsv_to_rgb(0.9, 0.7, 0.9)),
+        ("ND_rgbtohsv_color3", f"color3f inputs:in = {RED}", colorsys.rgb_to_hsv(*RED)),
+        ("ND_rgbtohsv_color3", "color3f inputs:in = (0.2, 0.1, 0.5)", colorsys.rgb_to_hsv(0.2, 0.1, 0.5)),
+        ("ND_rgbtohsv_color3", "color3f inputs:in = (0.2, 0.2, 0.2)", (0, 0, 0.2)),
+        ("ND_plus_color3", f"color3f inputs:bg = {RED}\ncolor3f inputs:fg = (0.2, 0.2, 0.2)", (0.7, 0.4, 0.3)),
+        ("ND_minus_color3", f"color3f inputs:bg = {RED}\ncolor3f inputs:fg = (0.1, 0.1, 0.1)", (0.4, 0.1, 0.0)),
+        (
+            "ND_screen_color3",
+            f"color3f inputs:bg = {RED}\ncolor3f inputs:fg = (0.5, 0.5, 0.5)\nfloat inputs:mix = 0.5",
+            (0.625, 0.4, 0.325),
+        ),
+    ],
+)
+def test_constants_are_adjusted_and_blended(
+    tmp_path: Path, identifier: str, inputs: str, color: tuple[float, ...]
+) -> None:
+    base = "color3f inputs:base_color.connect = </m/made.outputs:out>"
+    found, lost = read(tmp_path, GLTF, base, node("made", identifier, inputs))
+    np.testing.assert_allclose(found.diffuse_color, color, atol=1e-6)
+    assert lost == []
+
+
+@pytest.mark.parametrize(
+    ("identifier", "inputs", "scale", "bias"),
+    [
+        ("ND_contrast_color3FA", "float inputs:amount = 2\nfloat inputs:pivot = 0.25", 2, -0.25),
+        ("ND_screen_color3", "color3f inputs:fg = (0.5, 0.5, 0.5)", 0.5, 0.5),
+        ("ND_plus_color3", "color3f inputs:fg = (1, 1, 1)\nfloat inputs:mix = 0.5", 1, 0.5),
+    ],
+)
+def test_images_too_where_a_scale_and_a_bias_say_it(
+    tmp_path: Path, identifier: str, inputs: str, scale: float, bias: float
+) -> None:
+    source = "in" if "contrast" in identifier else "bg"
+    image = f"color3f inputs:{source}.connect = </m/wood.outputs:out>\n"
+    base = "color3f inputs:base_color.connect = </m/made.outputs:out>"
+    found, lost = read(tmp_path, GLTF, base, WOOD + node("made", identifier, image + inputs))
+    read_as = found.inputs["diffuse_color"]
+    np.testing.assert_allclose((read_as.scale[:3], read_as.bias[:3]), ((scale,) * 3, (bias,) * 3), atol=1e-6)
+    assert lost == []
