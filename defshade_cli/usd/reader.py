@@ -166,15 +166,15 @@ class StageReader:
         pieces = traversal.read_stage()
         placed = tuple(_surfaces(pieces, self._purposes))
         drawn = tuple((piece, surface) for piece, surface in placed if surface.groups)
-        if not drawn and not traversal.dormant:
-            raise EmptyStage(_empty(self._stage, traversal.issues))
+        if not drawn and not traversal.found.dormant:
+            raise EmptyStage(_empty(self._stage, traversal.found.issues))
         camera, camera_issues = self._read_camera(frame, time, placed)
         view = self._view(camera)
         drawn = tuple(faced(drawn, view, UNIFORM_LEVELS.get(self._complexity)))
         gprims = self._tessellate(drawn, view, levels)
         palette = Palette(self._memory, time, self._settings.material_purposes)
         meshes: dict[Mesh, int] = {}
-        glowing = _glowing(drawn, gprims, traversal.glows, palette)
+        glowing = _glowing(drawn, gprims, traversal.found.glows, palette)
         shown = [*drawables_of(drawn, gprims, meshes, palette, glowing)]
         shining = self._shared_lights([*_lights(pieces), *_all(glowing)])
         lights, drawables = link(self._stage, shining, shown)
@@ -185,10 +185,10 @@ class StageReader:
             drawables=drawables,
             materials=palette.materials,
             lights=lights,
-            portals=tuple(traversal.portals),
+            portals=tuple(traversal.found.portals),
             camera=camera,
             cameras=self._cameras,
-            unsupported=(*self._issues, *traversal.issues, *mended, *palette.issues, *camera_issues),
+            unsupported=(*self._issues, *traversal.found.issues, *mended, *palette.issues, *camera_issues),
             meters_per_unit=facts.meters_per_unit(self._stage),
             up_axis=facts.up_axis(self._stage),
             frame=frame,
