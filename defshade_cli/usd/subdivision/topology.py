@@ -24,12 +24,13 @@ _CHOICES: dict[str, tuple[str, ...]] = {
 }
 
 
-def _no_indices() -> NDArray[np.int32]:
-    return np.zeros(0, np.int32)
+_INDICES = ("face_counts", "face_indices", "holes", "crease_indices", "crease_lengths", "corner_indices")
+_SHARPNESSES = ("crease_sharpnesses", "corner_sharpnesses")
+_ARRAYS: dict[str, type] = dict.fromkeys(_INDICES, np.int32) | dict.fromkeys(_SHARPNESSES, np.float64)
 
-
-def _no_sharpnesses() -> NDArray[np.float64]:
-    return np.zeros(0)
+_NO_INDICES: NDArray[np.int32] = frozen([], np.int32, -1)
+_NO_SHARPNESSES: NDArray[np.float64] = frozen([], np.float64, -1)
+"""What most meshes have: not frozen again for each of them."""
 
 
 @dataclass(frozen=True, eq=False, slots=True, weakref_slot=True, kw_only=True)
@@ -51,18 +52,17 @@ class Topology:
     scheme: SchemeName = "catmullClark"
     interpolate_boundary: BoundaryRule = "edgeAndCorner"
     triangle_subdivision_rule: TriangleRule = "catmullClark"
-    holes: NDArray[Any] = field(default_factory=_no_indices)
-    crease_indices: NDArray[Any] = field(default_factory=_no_indices)
-    crease_lengths: NDArray[Any] = field(default_factory=_no_indices)
-    crease_sharpnesses: NDArray[Any] = field(default_factory=_no_sharpnesses)
-    corner_indices: NDArray[Any] = field(default_factory=_no_indices)
-    corner_sharpnesses: NDArray[Any] = field(default_factory=_no_sharpnesses)
+    holes: NDArray[Any] = field(default_factory=lambda: _NO_INDICES)
+    crease_indices: NDArray[Any] = field(default_factory=lambda: _NO_INDICES)
+    crease_lengths: NDArray[Any] = field(default_factory=lambda: _NO_INDICES)
+    crease_sharpnesses: NDArray[Any] = field(default_factory=lambda: _NO_SHARPNESSES)
+    corner_indices: NDArray[Any] = field(default_factory=lambda: _NO_INDICES)
+    corner_sharpnesses: NDArray[Any] = field(default_factory=lambda: _NO_SHARPNESSES)
 
     def __post_init__(self) -> None:
-        for name in ("face_counts", "face_indices", "holes", "crease_indices", "crease_lengths", "corner_indices"):
-            object.__setattr__(self, name, frozen(getattr(self, name), np.int32, -1))
-        for name in ("crease_sharpnesses", "corner_sharpnesses"):
-            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, -1))
+        for name, dtype in _ARRAYS.items():
+            if (values := getattr(self, name)) is not _NO_INDICES and values is not _NO_SHARPNESSES:
+                object.__setattr__(self, name, frozen(values, dtype, -1))
         self._check_rules()
         self._check_faces()
         self._check_creases()
