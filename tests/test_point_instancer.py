@@ -43,6 +43,29 @@ def ids(scene: Scene) -> list[int]:
     return drawable.instance_ids.tolist()
 
 
+@pytest.mark.parametrize(
+    ("array", "name", "length"),
+    [
+        ("float3[] scales = [(1, 1, 1), (9, 9, 9)]", "scales", 2),
+        ("quath[] orientations = [(0, 1, 0, 0)]", "orientations", 1),
+        ("quatf[] orientationsf = [(0, 1, 0, 0), (0, 1, 0, 0), (0, 1, 0, 0), (1, 0, 0, 0)]", "orientationsf", 4),
+    ],
+)
+def test_an_array_of_another_length_is_left_out(array: str, name: str, length: int) -> None:
+    """Of what fits nothing is lost: the others of the two still count."""
+    fitting = (
+        "float3[] scales = [(2, 2, 2), (2, 2, 2), (2, 2, 2)]"
+        if name != "scales"
+        else "quath[] orientations = [(0, 0, 1, 0), (0, 0, 1, 0), (0, 0, 1, 0)]"
+    )
+    scene = read(instancer(f"{THREE}\n{fitting}\n{array}"))
+    (drawn,) = scene.drawables
+    np.testing.assert_array_equal(drawn.world_from_object[:, 0, 3], [0, 1, 2])
+    expected = np.diag([-1, 1, -1]) if name == "scales" else 2 * np.eye(3)
+    np.testing.assert_allclose(drawn.world_from_object[:, :3, :3], np.tile(expected, (3, 1, 1)), atol=1e-6)
+    assert f"{name} is left out: {length} values where 3 are due" in reasons(scene, "/swarm")
+
+
 def test_copies_stand_where_usd_says() -> None:
     """Prototype's own transform, scale, rotation, position, the instancer's transform: in that order."""
     rng = np.random.default_rng(1)

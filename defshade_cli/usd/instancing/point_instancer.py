@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -37,7 +37,9 @@ def read_point_instancer(prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode)
     if not count:
         return Swarm()
     prototypes = instancer.GetPrototypesRel().GetForwardedTargets()
-    from_copy = _transforms(instancer, time, base)
+    odd = _of_other_lengths(instancer, base, count)
+    issues.extend(f"{name} is left out: {found} values where {count} are due" for name, found in odd.items())
+    from_copy = _transforms_without(instancer, odd, base) if odd else _transforms(instancer, time, base)
     if len(from_copy) != count:
         return Swarm(issues=("positions and protoIndices differ in length",))
     kept = _mask(instancer, base, count)
@@ -59,6 +61,26 @@ def has_varying_copies(prim: Usd.Prim) -> bool:
     instancer = UsdGeom.PointInstancer(prim)
     attributes = (instancer.GetProtoIndicesAttr(), instancer.GetPositionsAttr(), instancer.GetInvisibleIdsAttr())
     return any(attribute.ValueMightBeTimeVarying() for attribute in attributes)
+
+
+def _of_other_lengths(instancer: UsdGeom.PointInstancer, time: Usd.TimeCode, count: int) -> dict[str, int]:
+    """Arrays of another length than there are copies, and their lengths: USD reads beyond their ends."""
+    attributes = (instancer.GetScalesAttr(), instancer.GetOrientationsAttr(), instancer.GetOrientationsfAttr())
+    lengths = {str(attribute.GetName()): len(attribute.Get(time) or ()) for attribute in attributes}
+    return {name: length for name, length in lengths.items() if length not in (0, count)}
+
+
+def _transforms_without(
+    instancer: UsdGeom.PointInstancer, names: Collection[str], time: Usd.TimeCode
+) -> NDArray[np.float64]:
+    """As if the instancer said nothing of these arrays, nor of what moves its copies on."""
+    stage = Usd.Stage.CreateInMemory()
+    alone = UsdGeom.PointInstancer.Define(stage, "/instancer")
+    for name in ("protoIndices", "positions", "scales", "orientations", "orientationsf"):
+        value = instancer.GetPrim().GetAttribute(name).Get(time)
+        if name not in names and value is not None:
+            alone.GetPrim().GetAttribute(name).Set(value)
+    return _transforms(alone, Usd.TimeCode.Default(), Usd.TimeCode.Default())
 
 
 def _transforms(instancer: UsdGeom.PointInstancer, time: Usd.TimeCode, base: Usd.TimeCode) -> NDArray[np.float64]:
