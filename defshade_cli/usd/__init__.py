@@ -11,7 +11,8 @@ What prims are read as:
     gprims/, curves/, nurbs/, models/                 other shapes, and stand-ins for models
     skel/              bent by skeletons              instancing/        placed N times
     materials/         what they are made of          lights/            what lights them
-    camera, facing     who looks, and what turns to it                   drawables, palette   all of it as one Scene
+    camera, sight      who looks                      facing             what turns to it
+    drawables, palette all of it as one Scene
 
     values, color_space, xform   attributes as arrays      blame              why something failed
 """

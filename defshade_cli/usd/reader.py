@@ -9,29 +9,24 @@ from functools import cached_property
 from itertools import cycle
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
 from pxr import Usd
 
 from defshade_cli.errors import EmptyStage
 from defshade_cli.garbage import uncollected
-from defshade_cli.scene.camera import Camera, image_size
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
-from defshade_cli.scene.geometry import Drawable, Mesh, enclose, world_boxes
+from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.scene import Scene, Unsupported
 from defshade_cli.scene.texture import SeenFrom
 from defshade_cli.scene.view import View
 from defshade_cli.settings import Complexity
-from defshade_cli.spaces import Window, conform_window
 from defshade_cli.usd.blame import blaming
-from defshade_cli.usd.camera import choose_camera, default_window, find_cameras, framed_camera, read_camera
-from defshade_cli.usd.drawables import Glowing, drawables_of
+from defshade_cli.usd.camera import choose_camera, find_cameras
+from defshade_cli.usd.drawables import drawables_of
 from defshade_cli.usd.facing import PlacedSurface, faced
 from defshade_cli.usd.instancing.instancing import Piece
-from defshade_cli.usd.lights.light import camera_light
 from defshade_cli.usd.lights.linking import link
-from defshade_cli.usd.lights.mesh_light import Glows, glowing_lights
+from defshade_cli.usd.lights.shining import glowing_surfaces, lit, shining
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.opening import stage as facts
 from defshade_cli.usd.opening.unresolved import by_reason, find_unresolved
@@ -39,8 +34,8 @@ from defshade_cli.usd.palette import Palette
 from defshade_cli.usd.render_settings.render_pass import pass_issues, read_pass
 from defshade_cli.usd.render_settings.settings import read_settings
 from defshade_cli.usd.sharing import shared
+from defshade_cli.usd.sight import Sight
 from defshade_cli.usd.surfaces.complexity import UNIFORM_LEVELS, choose_levels
-from defshade_cli.usd.surfaces.extent import extents_of
 from defshade_cli.usd.surfaces.geometry import Gprim, Surface
 from defshade_cli.usd.surfaces.tessellation import Tessellation
 from defshade_cli.usd.traversal import Traversal
@@ -83,8 +78,7 @@ class StageReader:
         seen_from: SeenFrom | None = None,
         beside: StageReader | None = None,
     ) -> None:
-        self._complexity, self._size, self._width = complexity, size, width
-        self._extras, self._framing, self._studio = extras, framing, studio
+        self._complexity, self._extras, self._studio = complexity, extras, studio
         as_cages = complexity != "auto"
         self._memory: Memory = (
             beside._memory if beside else Memory(stage, extras, as_cages=as_cages, seen_from=seen_from)
@@ -97,17 +91,16 @@ class StageReader:
         self._lights: dict[str, Light] = {}
         self._pass = read_pass(stage, render_settings)
         self._cameras = find_cameras(stage)
+        chosen = None if framing else choose_camera(stage, self._cameras, camera, self._settings.camera)
+        self._sight = Sight(stage, self._settings, chosen, framing, size, width)
         unresolved = tuple(arc.unsupported for arc in find_unresolved(stage))
         self._told = set(unresolved)  # by open_stage
         self._issues = (*unresolved, *pass_issues(stage, render_settings))
-        self._camera = None if framing else choose_camera(stage, self._cameras, camera, self._settings.camera)
 
     @property
     def camera_name(self) -> str:
         """The prim name of the camera that renders; `framed`, `fit` or `turntable` for ours."""
-        if self._framing:
-            return self._framing.name
-        return self._camera.GetName() if self._camera else "framed"
+        return self._sight.name
 
     def first_frame(self) -> float | None:
         """The stage's startTimeCode; None, the default time, where no time range is authored."""
@@ -129,7 +122,7 @@ class StageReader:
                 neighbours = tuple(self._moment(scene, frame + step, levels) for step in (-1.0, 1.0))
                 scene = replace(scene, neighbours=neighbours)
         self._tell(scene.unsupported)
-        scene = self._lit(scene)
+        scene = lit(scene, studio=self._studio)
         self._still = scene if self.is_still else None
         return scene
 
@@ -143,7 +136,7 @@ class StageReader:
             time = Usd.TimeCode(scene.frame + offset)
             with facts.silence(), blaming(self._stage):
                 moment = self._read(scene.frame, time, self._levels)
-            yield self._lit(moment)
+            yield lit(moment, studio=self._studio)
 
     def _tell(self, issues: Iterable[Unsupported]) -> None:
         """Log what the picture lacks, or shows otherwise than authored, when it is first met."""
@@ -162,22 +155,21 @@ class StageReader:
     def _read(self, frame: float | None, time: Usd.TimeCode, levels: dict[str, int]) -> Scene:
         """levels: of refinement by path of the surface; those that are missing are chosen, and put in."""
         base = time if frame is None else Usd.TimeCode(frame)
-        traversal = Traversal(self._stage, self._memory, time, self._purposes, base, self._pass)
+        traversal = self._traversal(time, base)
         pieces = traversal.read_stage()
-        placed = tuple(_surfaces(pieces, self._purposes))
+        placed = self._surfaces(pieces)
         drawn = tuple((piece, surface) for piece, surface in placed if surface.groups)
         if not drawn and not traversal.found.dormant:
             raise EmptyStage(_empty(self._stage, traversal.found.issues))
-        camera, camera_issues = self._read_camera(frame, time, placed)
-        view = self._view(camera)
+        camera, camera_issues = self._sight.camera(frame, time, placed, self._placed_at)
+        view = self._sight.view(camera)
         drawn = tuple(faced(drawn, view, UNIFORM_LEVELS.get(self._complexity)))
         gprims = self._tessellate(drawn, view, levels)
         palette = Palette(self._memory, time, self._settings.material_purposes)
         meshes: dict[Mesh, int] = {}
-        glowing = _glowing(drawn, gprims, traversal.found.glows, palette)
+        glowing = glowing_surfaces(drawn, gprims, traversal.found.glows, palette)
         shown = [*drawables_of(drawn, gprims, meshes, palette, glowing)]
-        shining = self._shared_lights([*_lights(pieces), *_all(glowing)])
-        lights, drawables = link(self._stage, shining, shown)
+        lights, drawables = link(self._stage, self._shared_lights(shining(pieces, glowing)), shown)
         mended = dict.fromkeys(issue for gprim in gprims.values() for issue in gprim.issues)
         return Scene(
             name=facts.stage_name(self._stage),
@@ -204,6 +196,20 @@ class StageReader:
             rendering_space=self._settings.rendering_space,
         )
 
+    def _traversal(self, time: Usd.TimeCode, base: Usd.TimeCode) -> Traversal:
+        return Traversal(self._stage, self._memory, time, self._purposes, base, self._pass)
+
+    def _placed_at(self, time: Usd.TimeCode) -> Sequence[PlacedSurface]:
+        return self._surfaces(self._traversal(time, time).read_stage())
+
+    def _surfaces(self, pieces: Iterable[Piece]) -> tuple[PlacedSurface, ...]:
+        """Those of the pieces that count as geometry."""
+        return tuple(
+            (piece, piece.content)
+            for piece in pieces
+            if isinstance(piece.content, Surface) and (piece.purpose or "default") in self._purposes
+        )
+
     def _labels(self, drawables: Iterable[Drawable], time: Usd.TimeCode) -> Mapping[str, str]:
         from defshade_cli.usd.identity import read_labels
 
@@ -217,8 +223,7 @@ class StageReader:
     @cached_property
     def is_still(self) -> bool:
         """Is every frame like the first? The neighbours that motion asks for are read with their frame."""
-        turns = self._framing is not None and self._framing.turn is not None
-        return not (turns or self._extras.motion or self._may_change)
+        return not (self._sight.turns or self._extras.motion or self._may_change)
 
     @cached_property
     def _may_change(self) -> bool:
@@ -230,60 +235,6 @@ class StageReader:
         self._lights = {light.path: light for light in found}
         return found
 
-    def _read_camera(
-        self, frame: float | None, time: Usd.TimeCode, placed: Sequence[PlacedSurface]
-    ) -> tuple[Camera, tuple[Unsupported, ...]]:
-        if self._framing:
-            bounds = self._bounds_at_start if self._framing.turn else self._bounds(placed, time)
-            return self._framing.camera(bounds, facts.up_axis(self._stage), self._window, frame), ()
-        if self._camera is None:
-            return framed_camera(self._bounds(placed, time), facts.up_axis(self._stage)), ()
-        camera, issues = read_camera(self._camera, time)
-        return self._settings.applied_to(camera), issues
-
-    @property
-    def _window(self) -> Window:
-        """Of a camera of ours whose image has the shape that is asked for."""
-        window = default_window()
-        aspect = (window[1] - window[0]) / (window[3] - window[2])
-        width, height = image_size(aspect, self._size, self._width, self._settings.resolution)
-        return conform_window(window, width / height)
-
-    @cached_property
-    def _bounds_at_start(self) -> NDArray[np.float64]:
-        """(2, 3) at the stage's first frame: a turn shall not sway with what moves."""
-        start = self.first_frame()
-        time = Usd.TimeCode.Default() if start is None else Usd.TimeCode(start)
-        pieces = Traversal(self._stage, self._memory, time, self._purposes, time, self._pass).read_stage()
-        return self._bounds(tuple(_surfaces(pieces, self._purposes)), time)
-
-    def _bounds(self, placed: Sequence[PlacedSurface], time: Usd.TimeCode) -> NDArray[np.float64]:
-        """(2, 3) around the surfaces as authored, however they are refined, empty ones too."""
-        extents = extents_of(self._stage, [surface for _, surface in placed], time)
-        boxes = np.repeat(extents, [len(piece.root_from_object) for piece, _ in placed], axis=0)
-        matrices = np.concatenate([np.empty((0, 4, 4)), *(piece.root_from_object for piece, _ in placed)])
-        return enclose([world_boxes(boxes, matrices)])
-
-    def _lit(self, scene: Scene) -> Scene:
-        """The scene with lights of ours where it has none: the studio, or one at the camera as usdrecord has it."""
-        if scene.lights:
-            if self._studio:
-                log.info("the stage has lights of its own: no studio is added")
-            return scene
-        log.info(
-            "no light that is supported: %s", "the studio lights it" if self._studio else "one shines from the camera"
-        )
-        if not self._studio:
-            return replace(scene, lights=(camera_light(scene.camera),), lit_by="camera light")
-        from defshade_cli.scene.studio import studio_lights
-
-        return replace(scene, lights=studio_lights(scene), lit_by="studio")
-
-    def _view(self, camera: Camera) -> View:
-        width, height = image_size(camera.aspect, self._size, self._width, self._settings.resolution)
-        aspect = width * self._settings.pixel_aspect_for(camera) / height
-        return View(camera.conformed(aspect, self._settings.conform), height)
-
     def _tessellate(self, drawn: Iterable[PlacedSurface], view: View, levels: dict[str, int]) -> dict[Surface, Gprim]:
         placed = ((surface, piece.root_from_object) for piece, surface in drawn)
         chosen = choose_levels(placed, self._complexity, view)
@@ -292,41 +243,9 @@ class StageReader:
         )
 
 
-def _surfaces(pieces: Iterable[Piece], purposes: Sequence[str]) -> Iterator[PlacedSurface]:
-    for piece in pieces:
-        if isinstance(piece.content, Surface) and (piece.purpose or "default") in purposes:
-            yield piece, piece.content
-
-
 def _paths(drawables: Iterable[Drawable]) -> dict[str, None]:
     """Of every prim that is drawn, each once."""
     return dict.fromkeys(path for drawable in drawables for path in drawable.paths)
-
-
-def _glowing(
-    drawn: Iterable[PlacedSurface], gprims: Mapping[Surface, Gprim], glows: Glows, palette: Palette
-) -> dict[Piece, Glowing]:
-    """The surfaces that are lights, and these."""
-    found = ((piece, gprims[surface], glows[surface.path]) for piece, surface in drawn if surface.path in glows)
-    return {
-        piece: (glow, tuple(glowing_lights(piece, gprim, glow, palette.material)))
-        for piece, gprim, glow in found
-        if gprim.groups and len(piece.root_from_object)
-    }
-
-
-def _all(glowing: Mapping[Piece, Glowing]) -> Iterator[Light]:
-    return (light for _, lights in glowing.values() for light in lights)
-
-
-def _lights(pieces: Iterable[Piece]) -> Iterator[Light]:
-    for piece in pieces:
-        if isinstance(piece.content, Light):
-            count = len(piece.root_from_object)
-            paths = piece.paths if len(piece.paths) == count else piece.paths * count
-            for path, world_from_object in zip(paths, piece.root_from_object, strict=True):
-                world_from_light = world_from_object @ piece.content.world_from_light
-                yield replace(piece.content, path=path, world_from_light=world_from_light)
 
 
 def _empty(stage: Usd.Stage, issues: Iterable[Unsupported]) -> str:
