@@ -99,6 +99,34 @@ def test_bindings_of_instance_and_prototype_resolve_as_usd_does(strength: str, n
     assert material_names(StageReader(stage).read(None), "/a/trunk") == [f"/{name}"]
 
 
+@pytest.mark.parametrize(
+    "members",
+    [
+        "rel collection:some:includes = [</wood_lot/a/trunk>, </wood_lot/b/crown>]",
+        'uniform pathExpression collection:some:membershipExpression = "/wood_lot/a/trunk //inner//leaves"',
+        "rel collection:some:includes = [</wood_lot/b>]",
+    ],
+)
+def test_collections_bind_what_is_inside_instances(members: str) -> None:
+    """As the same stage has it without instances, nested ones too; each mesh is still read once."""
+    trees = instance("a") + instance("b", move(5)) + instance("c", source="lot")
+    text = f"""{MATERIALS}{TREE}class Xform "lot" {{
+        {instance("inner")}
+    }}
+    def Xform "wood_lot" (prepend apiSchemas = ["MaterialBindingAPI", "CollectionAPI:some"]) {{
+        {members}
+        rel material:binding = </wood>
+        rel material:binding:collection:some = [</wood_lot.collection:some>, </paint>]
+        {trees}
+    }}"""
+    shared, alone = read(text), read(text.replace("instanceable = true", ""))
+    paths = sorted(placed(alone))
+    assert sorted(placed(shared)) == paths
+    assert [material_names(shared, path) for path in paths] == [material_names(alone, path) for path in paths]
+    assert {name for path in paths for name in material_names(shared, path)} == {"/wood", "/paint"}
+    assert len(shared.meshes) == 2
+
+
 @pytest.mark.parametrize("purposes", [("default",), ("default", "render"), ("default", "proxy"), ("guide",)])
 def test_purposes_are_handed_down_as_usd_computes_them(purposes: tuple[str, ...]) -> None:
     text = TREE.replace('def Xform "crown" {', 'def Xform "crown" {\nuniform token purpose = "proxy"')

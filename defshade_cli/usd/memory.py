@@ -226,6 +226,10 @@ class Memory:
         """Relationships do not vary over time."""
         return self._bound(str(path)).bindings
 
+    def binds_by_collection(self, path: Sdf.Path) -> bool:
+        """Does a prim, or one above it, bind what a collection holds?"""
+        return self._bound(str(path)).by_collection
+
     def _bound(self, path: str, prim: Usd.Prim | None = None, said: Said | None = None) -> Bound:
         """From the nearest prim above whose bindings are known, downwards. prim, said: of the path, where known."""
         known = self._bindings.get(path)

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 
 from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.blame import blamed
 from defshade_cli.usd.instancing.instancing import Piece, Standing, finite, place
-from defshade_cli.usd.instancing.native_instances import NativeInstances
+from defshade_cli.usd.instancing.native_instances import NativeInstances, rebound
 from defshade_cli.usd.kind import Kind, Nature
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.models.draw_mode import FULL, handed_down, mode_above, takes_effect
@@ -156,7 +157,9 @@ class Traversal:
             if key not in self._prototypes:
                 children = first.prim.GetPrototype().GetChildren()
                 self._prototypes[key] = self._read(children, first.here.inside(first.prim))
-            yield from place(self._prototypes[key] or (), placement)
+            placed = place(self._prototypes[key] or (), placement)
+            held = self._memory.binds_by_collection(first.prim.GetPath())
+            yield from chain.from_iterable(rebound(piece, self._memory) for piece in placed) if held else placed
         for prim, reasons in instances.issues.items():
             self.found.report(prim, *reasons)
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from pxr import Sdf, Usd
 
-from defshade_cli.usd.instancing.instancing import Placement, Standing, read_display_of_instances
+from defshade_cli.usd.instancing.instancing import Piece, Placement, Standing, read_display_of_instances, some
 from defshade_cli.usd.materials.binding import Bindings
 from defshade_cli.usd.memory import Memory
+from defshade_cli.usd.surfaces.geometry import Surface
 from defshade_cli.usd.xform import matrices
 
 
@@ -75,3 +77,19 @@ class NativeInstances:
             prototype=self._memory.name_prototype(first.GetPrototype(), first),
             roots=tuple(self._memory.shown(instance.prim.GetPath()) for instance in instances),
         )
+
+
+def rebound(piece: Piece, memory: Memory) -> Iterator[Piece]:
+    """A piece of some instances in parts, bound as USD resolves it on the stage: collections may hold what is in one.
+
+    piece: placed on the stage; its bindings are by the paths of groups in the prototype.
+    """
+    surface = piece.content
+    if not isinstance(surface, Surface) or any("." in group for group in piece.bindings):  # stand-ins bind themselves
+        yield piece
+        return
+    below = [memory.shown(group)[len(surface.path) :] for group in piece.bindings]
+    found = [tuple(memory.bindings(path + end) for end in below) for path in piece.paths]
+    for bindings in dict.fromkeys(found):
+        part = piece if len(found) == 1 else some(piece, np.array([each == bindings for each in found]))
+        yield replace(part, bindings=dict(zip(piece.bindings, bindings, strict=True)))
