@@ -57,7 +57,7 @@ def Scope "Render" {
     }
     def RenderProduct "wide" {
         token productName = "out/wide.exr"
-        rel orderedVars = [</Render/Vars/Ci>, </Render/Vars/a>]
+        rel orderedVars = [</Render/Vars/Ci>, </Render/Vars/gone>, </Render/Vars/a>]
     }
     def RenderProduct "aovs" {
         rel camera = </side>
@@ -130,6 +130,7 @@ def test_what_is_left_out_is_told() -> None:
     told = invoke("shot.usda").stderr
     assert told.count("no layer answers odd (raw crowdDensity)") == 1
     assert "/Render/deep is left out: deep images are not rendered" in told
+    assert "/Render/wide names a variable /Render/Vars/gone that the stage lacks" in told
 
 
 def test_a_product_by_name_and_settings_by_path() -> None:

@@ -43,7 +43,7 @@ def read_products(stage: Usd.Stage, settings: str | None, frame: float | None) -
 
 
 def lost_products(stage: Usd.Stage, settings: str | None) -> Iterator[str]:
-    """A sentence for each product of the settings that read_products leaves out.
+    """A sentence for each product of the settings, and for each of their variables, that read_products leaves out.
 
     Raises PrimNotFound for settings that the stage lacks.
     """
@@ -56,6 +56,10 @@ def lost_products(stage: Usd.Stage, settings: str | None) -> Iterator[str]:
             yield f"{found.GetPath()} names a product {path} that the stage lacks"
         elif product.GetProductTypeAttr().Get() == UsdRender.Tokens.deepRaster:
             yield f"{path} is left out: deep images are not rendered"
+        else:
+            targets = product.GetOrderedVarsRel().GetForwardedTargets()
+            lost = (str(target) for target in targets if not UsdRender.Var.Get(stage, target))
+            yield from (f"{path} names a variable {target} that the stage lacks" for target in lost)
 
 
 def _all_settings(stage: Usd.Stage) -> list[Usd.Prim]:
