@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 import pytest
 
 from defshade_cli.usd import memory
+from defshade_cli.usd.materials import materials
 from defshade_cli.usd.reader import StageReader
 from stages import stage_of
 
@@ -61,20 +63,20 @@ def read_again(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     """How often each prim's surface, material and bindings were read."""
     counts: Counter[str] = Counter()
 
-    def counted(name: str, path_of: Callable[..., object]) -> None:
-        original = getattr(memory, name)
+    def counted(module: ModuleType, name: str, path_of: Callable[..., object]) -> None:
+        original = getattr(module, name)
 
         def count(*args: Any, **options: Any) -> Any:
             counts[f"{name} {path_of(*args)}"] += 1
             return original(*args, **options)
 
-        monkeypatch.setattr(memory, name, count)
+        monkeypatch.setattr(module, name, count)
 
-    counted("read_surface", lambda prim, *_: prim.GetPath())
-    counted("is_time_varying", lambda prim, *_: prim.GetPath())
-    counted("read_material", lambda _, path, *__: path)
-    counted("read_bound", lambda prim, *_: prim.GetPath())
-    counted("told_of", lambda said, *_: said.path)
+    counted(memory, "read_surface", lambda prim, *_: prim.GetPath())
+    counted(memory, "is_time_varying", lambda prim, *_: prim.GetPath())
+    counted(materials, "read_material", lambda _, path, *__: path)
+    counted(materials, "read_bound", lambda prim, *_: prim.GetPath())
+    counted(memory, "told_of", lambda said, *_: said.path)
     return counts
 
 

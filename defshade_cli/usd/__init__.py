@@ -3,7 +3,7 @@
     opening/           a file → an open stage         render_settings/   what it asks for, and as what
     reader             the frames of one product      traversal          the walk over its prims: kind, said, identity
                                                       pieces             what each of them is
-    memory, sharing    what stays from frame to frame
+    memory, sharing    what stays from frame to frame, materials/materials of it                names   of prims
 
 What prims are read as:
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
@@ -11,16 +11,14 @@ from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.texture import SeenFrom
-from defshade_cli.usd.blame import blamed
 from defshade_cli.usd.kind import Kinds
-from defshade_cli.usd.materials.binding import NOTHING_ABOVE, NOTHING_BOUND, Bindings, Bound, Known, read_bound
-from defshade_cli.usd.materials.material import ReadMaterial, not_understood, read_material
+from defshade_cli.usd.materials.materials import Materials
 from defshade_cli.usd.models import draw_mode
+from defshade_cli.usd.names import Names
 from defshade_cli.usd.opening.stage import has_clips
 from defshade_cli.usd.polygons.checked import check_all
 from defshade_cli.usd.polygons.polygons import Polygons
 from defshade_cli.usd.polygons.positions import is_carried_by_velocities
-from defshade_cli.usd.polygons.primvars import DISPLAY_COLOR
 from defshade_cli.usd.polygons.shapes import Shapes
 from defshade_cli.usd.polygons.subsets import material_subsets
 from defshade_cli.usd.polygons.told import Told, told_of
@@ -57,11 +55,11 @@ def _tried(step: Callable[..., T], *arguments: Any) -> T | Exception:
 
 
 class Memory:
-    """The unchanging parts of one stage, and the names of what stands in its prototypes.
+    """The unchanging parts of one stage: its surfaces here, and what they are made of and called.
 
     seen_from: for cards placed by their textures.
     as_cages: what is round is what Hydra draws of it: see gprims.read_solid, and facing.
-    stage: what is read.  kinds: of prims.  clipped: see stage.has_clips.  instanced: are there native instances?
+    kinds: of prims.  clipped: see stage.has_clips.  instanced: are there native instances?
     xforms: USD's cache, which drops only what varies when its time is set.
     """
 
@@ -77,15 +75,12 @@ class Memory:
         self.clipped = has_clips(stage)
         self.instanced = bool(stage.GetPrototypes())
         self.xforms = UsdGeom.XformCache()
-        self.stage, self._extras, self._as_cages = stage, extras, as_cages
+        self.names = Names()
+        self.materials = Materials(stage, self.names, occlusion=extras.occlusion)
+        self._extras, self._as_cages = extras, as_cages
         self._shapes = Shapes()
         self._surfaces: dict[str, tuple[Usd.TimeCode, Surface | None]] = {}
         self._time_varying: dict[str, bool] = {}
-        self._bindings: dict[str, Bound] = {"/": NOTHING_ABOVE}
-        self._materials: dict[Sdf.Path, ReadMaterial] = {}
-        self._bound_directly: Known = {}
-        self._colors: dict[Bindings, str] = {}
-        self._first_instances: dict[str, str] = {}
         self._models = draw_mode.StandIns(seen_from)
         self._stand_ins: dict[tuple[Sdf.Path, str], Surface] = {}
 
@@ -137,7 +132,7 @@ class Memory:
     def _ask(self, prim: Usd.Prim, said: Said, time: Usd.TimeCode) -> Asked | None:
         """What an unknown mesh says, to be looked into with others; None of one that is to be read by itself."""
         subsets = [] if said.is_leaf else material_subsets(prim)
-        told = told_of(said, time, self._color_of(prim, said, subsets, time))
+        told = told_of(said, time, self.materials.color_of(prim, said, subsets, time))
         return told and Asked(subsets, told)
 
     def _new_surface(
@@ -162,7 +157,7 @@ class Memory:
 
     def _at_another_time(self, known: Surface, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Surface | None:
         """Read is no more than varies; what turns out to be equal stays the same object."""
-        shown = self._color_of(prim, said, material_subsets(prim), time), self._extras.primvars
+        shown = self.materials.color_of(prim, said, material_subsets(prim), time), self._extras.primvars
         moved = move_surface(known, prim, time) if known.groups and only_points_vary(prim, *shown) else None
         return shared(moved or self._read_surface(prim, time, said), known)
 
@@ -171,7 +166,7 @@ class Memory:
         surface = read_surface(
             prim,
             time,
-            self._color_of(prim, said, subsets, time),
+            self.materials.color_of(prim, said, subsets, time),
             self._extras.primvars,
             self._shapes,
             as_cages=self._as_cages,
@@ -187,84 +182,15 @@ class Memory:
             self._stand_ins[key] = self._as_shown(self._models.read(prim, mode))
         return self._stand_ins[key]
 
-    def _color_of(self, prim: Usd.Prim, said: Said, subsets: Iterable[UsdGeom.Subset], time: Usd.TimeCode) -> str:
-        """What stands for displayColor: the primvar that a material bound to the prim reads its colour from."""
-        bound = [self._bound(said.path, prim, said), *[self._bound(str(s.GetPath()), s.GetPrim()) for s in subsets]]
-        return next((color for each in bound if (color := self._color_by(each.bindings, time))), DISPLAY_COLOR)
-
-    def _color_by(self, bindings: Bindings, time: Usd.TimeCode) -> str:
-        """The same of some bindings, empty where none does; found once for all prims with these."""
-        if bindings == NOTHING_BOUND:
-            return ""
-        color = self._colors.get(bindings)
-        if color is None:
-            read = (self.material(path, time).material.color_primvar for path in bindings.candidates)
-            color = next((name for name in read if name), "")
-            if all(path in self._materials for path in bindings.candidates):
-                self._colors[bindings] = color
-        return color
-
-    def material(self, path: Sdf.Path, time: Usd.TimeCode) -> ReadMaterial:
-        """The material at a path; read once where it does not change over time."""
-        if path in self._materials:
-            return self._materials[path]
-        try:
-            read = self._read_material(path, time)
-        except Exception as error:  # a bug goes on as one
-            reason = blamed(error, self.stage.GetPrimAtPath(path.GetPrimPath()))
-            read = not_understood(self.shown(path), reason)
-        if not read.time_varying:
-            self._materials[path] = read
-        return read
-
-    def _read_material(self, path: Sdf.Path, time: Usd.TimeCode) -> ReadMaterial:
-        if path.IsPropertyPath():
-            return draw_mode.read_material(self.stage, path, self.shown(path))
-        return read_material(self.stage, path, self.shown(path), time, occlusion=self._extras.occlusion)
-
-    def bindings(self, path: Sdf.Path | str) -> Bindings:
-        """Relationships do not vary over time."""
-        return self._bound(str(path)).bindings
-
-    def binds_by_collection(self, path: Sdf.Path) -> bool:
-        """Does a prim, or one above it, bind what a collection holds?"""
-        return self._bound(str(path)).by_collection
-
-    def _bound(self, path: str, prim: Usd.Prim | None = None, said: Said | None = None) -> Bound:
-        """From the nearest prim above whose bindings are known, downwards. prim, said: of the path, where known."""
-        known = self._bindings.get(path)
-        if known is not None:
-            return known
-        above: list[str] = []
-        while (parent := (above[-1] if above else path).rpartition("/")[0] or "/") not in self._bindings:
-            above.append(parent)
-        bound = self._bindings[parent]
-        for each in reversed(above):
-            bound = self._bindings[each] = read_bound(self.stage.GetPrimAtPath(each), bound, self._bound_directly)
-        prim = prim or self.stage.GetPrimAtPath(path)
-        bound = self._bindings[path] = read_bound(prim, bound, self._bound_directly, said)
-        return bound
-
-    def shown(self, path: Sdf.Path | str) -> str:
-        """The path by which users know a prim: for one inside a native prototype, its path in the first instance."""
-        if not self._first_instances:
-            return str(path)
-        root, slash, below = str(path)[1:].partition("/")
-        return self._first_instances.get(root, f"/{root}") + slash + below
-
-    def name_prototype(self, prototype: Usd.Prim, instance: Usd.Prim) -> str:
-        """Show what stands in `prototype` as part of `instance`, or of the instance that came first."""
-        return self._first_instances.setdefault(prototype.GetName(), self.shown(instance.GetPath()))
-
     def _is_time_varying(self, prim: Usd.Prim, said: Said) -> bool:
         """Asked only when a second frame is read."""
         if said.path not in self._time_varying:
-            color = self._color_of(prim, said, material_subsets(prim), Usd.TimeCode.Default())
+            color = self.materials.color_of(prim, said, material_subsets(prim), Usd.TimeCode.Default())
             self._time_varying[said.path] = is_time_varying(prim, color, self._extras.primvars, said)
         return self._time_varying[said.path]
 
     def _as_shown(self, surface: Surface) -> Surface:
-        shown = self.shown(surface.path)
+        shown = self.names.shown(surface.path)
         if shown == surface.path:
             return surface
         issues = tuple(replace(issue, path=shown) for issue in surface.issues)

@@ -11,8 +11,8 @@ from defshade_cli.scene.material import UNBOUND, Material
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.instancing.instancing import Piece, some
 from defshade_cli.usd.materials.binding import PURPOSES, Bindings
+from defshade_cli.usd.materials.materials import Materials
 from defshade_cli.usd.materials.worn import Value, on_mesh, read_values, with_primvars
-from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.surfaces.geometry import Gprim
 
 
@@ -21,12 +21,12 @@ class Palette:
 
     Of the materials bound to a prim the first that is understood is taken, in the order of `purposes`:
     a production look that only its own renderer knows gives way to the UsdPreviewSurface beside it. Where none is
-    understood, the first is reported, once.
+    understood, the first is reported, once. known: the materials of the stage.
     """
 
-    def __init__(self, memory: Memory, time: Usd.TimeCode, purposes: Sequence[str] = PURPOSES) -> None:
+    def __init__(self, known: Materials, time: Usd.TimeCode, purposes: Sequence[str] = PURPOSES) -> None:
         self.issues: dict[Unsupported, None] = {}
-        self._memory, self._time, self._purposes = memory, time, purposes
+        self._known, self._time, self._purposes = known, time, purposes
         self._numbers: dict[Material, int] = {}
         self._chosen: dict[Bindings, Material] = {}
 
@@ -34,10 +34,6 @@ class Palette:
     def materials(self) -> tuple[Material, ...]:
         """In the order of their numbers."""
         return tuple(self._numbers)
-
-    def number(self, bindings: Bindings) -> int:
-        """Index into `materials` of the one that is drawn."""
-        return self.number_of(self.material(bindings))
 
     def number_of(self, material: Material) -> int:
         """Index into `materials`, of which it becomes one."""
@@ -57,7 +53,7 @@ class Palette:
         if not names:
             yield piece, materials
             return
-        read = [read_values(self._memory.stage, path, names, self._time, self.issues) for path in piece.paths]
+        read = [read_values(self._known.stage, path, names, self._time, self.issues) for path in piece.paths]
         for values in dict.fromkeys(read):
             part = piece if len(read) == 1 else some(piece, np.array([each == values for each in read]))
             yield part, [self._filled(material, dict(zip(names, values, strict=True))) for material in materials]
@@ -69,7 +65,7 @@ class Palette:
         return filled
 
     def _choose(self, bindings: Bindings) -> Material:
-        candidates = [self._memory.material(path, self._time) for path in bindings.candidates_for(self._purposes)]
+        candidates = [self._known.read(path, self._time) for path in bindings.candidates_for(self._purposes)]
         if not candidates:
             return UNBOUND
         chosen = next((candidate for candidate in candidates if candidate.understood), candidates[0])

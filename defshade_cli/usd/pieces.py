@@ -56,7 +56,7 @@ class Found:
 
     def report(self, prim: Usd.Prim, *reasons: str) -> None:
         """Why something of a prim is left out."""
-        path = self._memory.shown(prim.GetPath())
+        path = self._memory.names.shown(prim.GetPath())
         self.issues.update(dict.fromkeys(Unsupported(path, reason) for reason in reasons))
 
 
@@ -87,7 +87,7 @@ class PieceReader:
 
     def _light(self, prim: Usd.Prim, here: Standing) -> Piece | None:
         """A light with a shape of its own; portals and surfaces that glow are noted."""
-        path = self._memory.shown(prim.GetPath())
+        path = self._memory.names.shown(prim.GetPath())
         if prim.IsA(UsdLux.PortalLight):
             self._found.portals.append(path)
             return None
@@ -142,7 +142,7 @@ class PieceReader:
                 raise surface
             piece, issues = self._standing_piece(prim, here, surface)
         except Exception as error:  # a bug goes on as one
-            late.append((place, Unsupported(self._memory.shown(prim.GetPath()), blamed(error, prim))))
+            late.append((place, Unsupported(self._memory.names.shown(prim.GetPath()), blamed(error, prim))))
             return None
         late.extend([(place, issue) for issue in issues])
         return piece
@@ -154,7 +154,7 @@ class PieceReader:
         if surface.groups and here.rig:
             surface, here = self._deformed(prim, surface, here, here.rig)
         self._found.dormant |= not surface.groups and is_time_varying(prim)
-        bindings = {path: self._memory.bindings(path) for path in surface.groups}
+        bindings = {path: self._memory.materials.bindings(path) for path in surface.groups}
         return self._piece(prim, here, surface, bindings), surface.issues
 
     def _check_joints(self, prim: Usd.Prim, here: Standing) -> None:
@@ -184,7 +184,7 @@ class PieceReader:
         return Piece(
             content,
             placed[None] if len(copies.ids) == 1 and copies.ids[0] < 0 else placed @ copies.object_from_copy,
-            (content.path if isinstance(content, Surface) else self._memory.shown(prim.GetPath()),),
+            (content.path if isinstance(content, Surface) else self._memory.names.shown(prim.GetPath()),),
             copies.ids,
             copies.display_color,
             copies.display_opacity,

@@ -165,7 +165,7 @@ class StageReader:
         view = self._sight.view(camera)
         drawn = tuple(faced(drawn, view, UNIFORM_LEVELS.get(self._complexity)))
         gprims = self._tessellate(drawn, view, levels)
-        palette = Palette(self._memory, time, self._settings.material_purposes)
+        palette = Palette(self._memory.materials, time, self._settings.material_purposes)
         meshes: dict[Mesh, int] = {}
         glowing = glowing_surfaces(drawn, gprims, traversal.found.glows, palette)
         shown = [*drawables_of(drawn, gprims, meshes, palette, glowing)]

@@ -158,7 +158,7 @@ class Traversal:
                 children = first.prim.GetPrototype().GetChildren()
                 self._prototypes[key] = self._read(children, first.here.inside(first.prim))
             placed = place(self._prototypes[key] or (), placement)
-            held = self._memory.binds_by_collection(first.prim.GetPath())
+            held = self._memory.materials.binds_by_collection(first.prim.GetPath())
             yield from chain.from_iterable(rebound(piece, self._memory) for piece in placed) if held else placed
         for prim, reasons in instances.issues.items():
             self.found.report(prim, *reasons)
@@ -174,7 +174,7 @@ class Traversal:
                 placement,
                 root_from_copy=matrix(here.root_from_prim) @ placement.root_from_copy,
                 purpose=here.purpose,
-                bindings=self._memory.bindings(prim.GetPath()),
+                bindings=self._memory.materials.bindings(prim.GetPath()),
                 in_world=here.in_world,
             )
             yield from place(self._point_prototype(path, prim, here), placed)
@@ -185,7 +185,7 @@ class Traversal:
         if key not in self._prototypes:
             root = self._stage.GetPrimAtPath(path)
             if not root or not root.IsActive():
-                self.found.report(instancer, f"there is no prototype {self._memory.shown(path)}")
+                self.found.report(instancer, f"there is no prototype {self._memory.names.shown(path)}")
                 return ()
             self._prototypes[key] = None
             above = UsdGeom.Imageable(root.GetParent()).ComputePurposeInfo()

@@ -51,7 +51,9 @@ class NativeInstances:
         """Note an instance, with those that share its prototype and all that it inherits."""
         prototype = prim.GetPrototype().GetPath()
         animation = self._memory.rigs.animation_of(here.on_stage(prim))
-        sharing = Sharing(prototype, animation, self._memory.bindings(prim.GetPath()), here.in_world, here.purpose)
+        sharing = Sharing(
+            prototype, animation, self._memory.materials.bindings(prim.GetPath()), here.in_world, here.purpose
+        )
         self._shared[sharing].append(Instance(prim, here, self._met[prototype]))
         self._met[prototype] += 1
 
@@ -74,8 +76,8 @@ class NativeInstances:
             sharing.purpose,
             sharing.bindings,
             sharing.in_world,
-            prototype=self._memory.name_prototype(first.GetPrototype(), first),
-            roots=tuple(self._memory.shown(instance.prim.GetPath()) for instance in instances),
+            prototype=self._memory.names.name_prototype(first.GetPrototype(), first),
+            roots=tuple(self._memory.names.shown(instance.prim.GetPath()) for instance in instances),
         )
 
 
@@ -88,8 +90,8 @@ def rebound(piece: Piece, memory: Memory) -> Iterator[Piece]:
     if not isinstance(surface, Surface) or any("." in group for group in piece.bindings):  # stand-ins bind themselves
         yield piece
         return
-    below = [memory.shown(group)[len(surface.path) :] for group in piece.bindings]
-    found = [tuple(memory.bindings(path + end) for end in below) for path in piece.paths]
+    below = [memory.names.shown(group)[len(surface.path) :] for group in piece.bindings]
+    found = [tuple(memory.materials.bindings(path + end) for end in below) for path in piece.paths]
     for bindings in dict.fromkeys(found):
         part = piece if len(found) == 1 else some(piece, np.array([each == bindings for each in found]))
         yield replace(part, bindings=dict(zip(piece.bindings, bindings, strict=True)))
