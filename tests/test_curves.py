@@ -11,7 +11,7 @@ from pxr import UsdGeom, Vt
 from scipy.interpolate import BSpline
 
 from defshade_cli.usd.curves.basis import Kind, sample_curves
-from defshade_cli.usd.surfaces.geometry import is_time_varying
+from defshade_cli.usd.surfaces.varying import is_time_varying
 from prims import Drawn, new_stage, read, reasons, set_primvar
 
 LINE = [(0, 0, 0), (0, 0, 1), (0, 0, 2), (0, 0, 3)]

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
 
-from defshade_cli.usd.surfaces.geometry import is_time_varying, read_surface
+from defshade_cli.usd.surfaces.geometry import read_surface
+from defshade_cli.usd.surfaces.varying import is_time_varying
 from prims import (
     CUBE_FACES,
     CUBE_POINTS,

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from pxr import UsdGeom, Vt
 
-from defshade_cli.usd.surfaces.geometry import is_time_varying
+from defshade_cli.usd.surfaces.varying import is_time_varying
 from prims import new_stage, read, reasons, set_primvar
 
 HALF = math.sqrt(0.5)

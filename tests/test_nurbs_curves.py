@@ -12,7 +12,7 @@ from scipy.interpolate import BSpline
 
 from defshade_cli.usd.curves.nurbs_curves import read_nurbs_curves
 from defshade_cli.usd.curves.strands import Strands
-from defshade_cli.usd.surfaces.geometry import is_time_varying
+from defshade_cli.usd.surfaces.varying import is_time_varying
 from prims import DEFAULT, new_stage, read, reasons, set_primvar
 from test_nurbs import CIRCLE, CIRCLE_KNOTS, WEIGHTS
 

@@ -8,7 +8,7 @@ from pxr import Usd
 
 import stages
 from defshade_cli.scene.scene import Scene
-from defshade_cli.usd.surfaces.geometry import is_time_varying
+from defshade_cli.usd.surfaces.varying import is_time_varying
 from prims import reasons, try_read
 from stages import instance
 

@@ -7,8 +7,9 @@ import pytest
 from pxr import Gf, Usd, UsdGeom, UsdShade, Vt
 
 from defshade_cli.usd.polygons import refiner
-from defshade_cli.usd.surfaces.geometry import is_time_varying, read_surface
+from defshade_cli.usd.surfaces.geometry import read_surface
 from defshade_cli.usd.surfaces.tessellation import Tessellation
+from defshade_cli.usd.surfaces.varying import is_time_varying
 from prims import CUBE_FACES, CUBE_POINTS, Drawn, define_cube, define_mesh, is_watertight, read, reasons, set_primvar
 from prims import volume as volume_of
 

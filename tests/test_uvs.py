@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
-from defshade_cli.usd.surfaces.geometry import is_time_varying
+from defshade_cli.usd.surfaces.varying import is_time_varying
 from prims import define_cube, define_mesh, read, reasons, set_primvar
 
 POINTS = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [0, 1, 0]]

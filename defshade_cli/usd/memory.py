@@ -24,15 +24,9 @@ from defshade_cli.usd.polygons.subsets import material_subsets
 from defshade_cli.usd.polygons.told import Told, told_of
 from defshade_cli.usd.said import Said
 from defshade_cli.usd.sharing import shared
-from defshade_cli.usd.surfaces.geometry import (
-    Shape,
-    Surface,
-    is_time_varying,
-    move_surface,
-    only_points_vary,
-    read_surface,
-    surface_of,
-)
+from defshade_cli.usd.surfaces.geometry import Surface, move_surface, read_surface, surface_of
+from defshade_cli.usd.surfaces.shape import Shape
+from defshade_cli.usd.surfaces.varying import is_time_varying, only_points_vary
 
 if TYPE_CHECKING:
     from defshade_cli.usd.skel import Rigs

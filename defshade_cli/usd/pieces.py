@@ -21,7 +21,8 @@ from defshade_cli.usd.materials.binding import Bindings, bound_to
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.models.draw_mode import FULL
 from defshade_cli.usd.said import Said
-from defshade_cli.usd.surfaces.geometry import Surface, is_time_varying
+from defshade_cli.usd.surfaces.geometry import Surface
+from defshade_cli.usd.surfaces.varying import is_time_varying
 from defshade_cli.usd.xform import gf_matrix, matrix
 
 if TYPE_CHECKING:

@@ -3,15 +3,14 @@
 prim ── mesh | gprims ──→ Polygons ──→ Surface      what is authored, read once
 Surface ── refiner ── normals ── cut ──→ Gprim      as finely as the picture needs
 
-What reads prims of one type alone is imported where there are such.
+shape says what is read of a prim by its type, varying what of it may change over time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,32 +20,29 @@ from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.gprims.copies import Copies
-from defshade_cli.usd.gprims.gprims import read_solid, size_attributes
-from defshade_cli.usd.polygons.control import CONTROL_ATTRIBUTES, Control, read_control, smooth_control
+from defshade_cli.usd.polygons.control import Control, read_control, smooth_control
 from defshade_cli.usd.polygons.cut import Cut, cut
-from defshade_cli.usd.polygons.mesh import MESH_ATTRIBUTES, read_mesh
 from defshade_cli.usd.polygons.normals import with_normals
 from defshade_cli.usd.polygons.polygons import Polygons, Primvar, varying
-from defshade_cli.usd.polygons.positions import is_carried_by_velocities, read_positions
+from defshade_cli.usd.polygons.positions import read_positions
 from defshade_cli.usd.polygons.primvars import (
     DISPLAY_COLOR,
     Elements,
     count_elements,
-    find_primvars,
     read_shown,
-    uv_width,
 )
 from defshade_cli.usd.polygons.shapes import Shapes
 from defshade_cli.usd.polygons.small_meshes import Shaped
 from defshade_cli.usd.polygons.subsets import FaceGroup, Faces, material_subsets, read_faces
 from defshade_cli.usd.said import Said, said_of
 from defshade_cli.usd.sharing import shared
+from defshade_cli.usd.surfaces.shape import Shape, read_shape
 
 if TYPE_CHECKING:
     from defshade_cli.usd.curves.strands import Strands
     from defshade_cli.usd.polygons.refiner import Refiner
 
-__all__ = ["FaceGroup", "Gprim", "Surface", "is_time_varying", "read_surface", "tessellate"]
+__all__ = ["FaceGroup", "Gprim", "Surface", "read_surface", "tessellate"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,21 +109,13 @@ def read_surface(
     """
     issues: list[str] = []
     said = said or said_of(prim)
-    shape = _read_shape(prim, said, time, issues, color, as_cages)
+    shape = read_shape(prim, said, time, issues, color, as_cages)
     if shape is None:
         return None
     if shown:
         read = read_shown(prim, shown, time, _elements(shape.polygons), issues)
         shape = shape._replace(polygons=replace(shape.polygons, shown=read))
     return surface_of(prim, said, time, shape, shapes, subsets, issues)
-
-
-class Shape(NamedTuple):
-    """What a prim is before its materials count; copies and strands as in Surface."""
-
-    polygons: Polygons
-    copies: Copies | None = None
-    strands: Strands | None = None
 
 
 def surface_of(
@@ -206,78 +194,6 @@ def move_surface(
     return replace(surface, polygons=replace(polygons, points=points))
 
 
-def only_points_vary(prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = ()) -> bool:
-    """Is a mesh, if anything of it varies, the same but for its points?"""
-    return prim.IsA(UsdGeom.Mesh) and varying_names(prim, color, shown) <= {"points", "velocities", "accelerations"}
-
-
-def is_time_varying(
-    prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = (), said: Said | None = None
-) -> bool:
-    """Whether anything that is read of the prim has more than one value over time."""
-    return bool(varying_names(prim, color, shown, said))
-
-
-def varying_names(
-    prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = (), said: Said | None = None
-) -> set[str]:
-    """Of what read_surface reads, primvars inherited and face subsets included, what may differ over time."""
-    said = said or said_of(prim)
-    attributes = (prim.GetAttribute(name) for name in _attributes(prim) if name in said.names)
-    subsets = (subset.GetIndicesAttr() for subset in material_subsets(prim))
-    sources = (*attributes, *(_carried(prim, color, shown) if said.primvars else ()), *subsets)
-    names = {str(source.GetName()) for source in sources if source and source.ValueMightBeTimeVarying()}
-    return names | {"velocities"} if _moves_by_velocities(prim, said) else names
-
-
-def _moves_by_velocities(prim: Usd.Prim, said: Said) -> bool:
-    may = "velocities" in said.names and prim.IsA(UsdGeom.PointBased)
-    return may and is_carried_by_velocities(prim, Usd.TimeCode(0.0))
-
-
-def _carried(prim: Usd.Prim, color: str, shown: tuple[str, ...]) -> Iterator[UsdGeom.Primvar]:
-    """The primvars that may be read of it, see primvars.read_carried."""
-    api = UsdGeom.PrimvarsAPI(prim)
-    yield from (api.GetPrimvar(name) for name in ("normals", "widths"))
-    yield from (api.FindPrimvarWithInheritance(name) for name in shown)
-    found = find_primvars(prim).items()
-    yield from (p for name, p in found if name in (color, "displayOpacity") or uv_width(p))
-
-
-def _read_shape(
-    prim: Usd.Prim, said: Said, time: Usd.TimeCode, issues: list[str], color: str, as_cages: bool
-) -> Shape | None:
-    """None for a type that is no supported surface."""
-    solid = read_solid(prim, said, time, issues, color, as_cage=as_cages)
-    if solid is not None:
-        return Shape(solid)
-    if said.type_name == "Mesh" or prim.IsA(UsdGeom.Mesh):
-        return Shape(read_mesh(prim, said, time, issues, color))
-    if prim.IsA(UsdGeom.Points):
-        from defshade_cli.usd.gprims.points import read_points
-
-        return Shape(*read_points(UsdGeom.Points(prim), time, issues, color, as_disks=as_cages))
-    if prim.IsA(UsdGeom.BasisCurves):
-        from defshade_cli.usd.curves.curves import read_curves
-
-        return _along(read_curves(UsdGeom.BasisCurves(prim), time, issues, color))
-    if prim.IsA(UsdGeom.NurbsCurves):
-        from defshade_cli.usd.curves.nurbs_curves import read_nurbs_curves
-
-        return _along(read_nurbs_curves(UsdGeom.NurbsCurves(prim), time, issues, color))
-    if prim.IsA(UsdGeom.NurbsPatch):
-        from defshade_cli.usd.nurbs.nurbs import read_patch
-
-        return Shape(read_patch(UsdGeom.NurbsPatch(prim), time, issues, color))
-    return None
-
-
-def _along(strands: Strands) -> Shape:
-    from defshade_cli.usd.curves.sweep import swept
-
-    return Shape(swept(strands), strands=strands)
-
-
 def _is_double_sided(prim: Usd.Prim, said: Said) -> bool:
     """Planes are, unless they say otherwise."""
     if "doubleSided" in said.names:
@@ -290,29 +206,6 @@ def _doubles_sides(type_name: str) -> bool:
     """By the schema of a type."""
     definition = Usd.SchemaRegistry().FindConcretePrimDefinition(type_name)
     return bool(definition and definition.GetAttributeFallbackValue("doubleSided"))
-
-
-def _attributes(prim: Usd.Prim) -> tuple[str, ...]:
-    """What is read of a prim and may vary over time, besides primvars."""
-    if prim.IsA(UsdGeom.Mesh):
-        return MESH_ATTRIBUTES + CONTROL_ATTRIBUTES
-    if prim.IsA(UsdGeom.Points):
-        from defshade_cli.usd.gprims.points import POINTS_ATTRIBUTES
-
-        return POINTS_ATTRIBUTES
-    if prim.IsA(UsdGeom.BasisCurves):
-        from defshade_cli.usd.curves.curves import CURVES_ATTRIBUTES
-
-        return CURVES_ATTRIBUTES
-    if prim.IsA(UsdGeom.NurbsCurves):
-        from defshade_cli.usd.curves.nurbs_curves import NURBS_CURVES_ATTRIBUTES
-
-        return NURBS_CURVES_ATTRIBUTES
-    if prim.IsA(UsdGeom.NurbsPatch):
-        from defshade_cli.usd.nurbs.nurbs import PATCH_ATTRIBUTES
-
-        return PATCH_ATTRIBUTES
-    return size_attributes(prim)
 
 
 def _constant(primvar: Primvar | None) -> NDArray[np.float32] | None:
