@@ -17,7 +17,7 @@ from defshade_cli.usd.polygons import cut as cutting
 from defshade_cli.usd.polygons import refiner
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.sharing import shared
-from defshade_cli.usd.surfaces import geometry
+from defshade_cli.usd.surfaces import shape
 from stages import read, stage_of
 
 GRID = """def Mesh "grid" {
@@ -59,7 +59,7 @@ def test_moving_points_are_all_that_is_made_anew(scheme: str, monkeypatch: pytes
     reader = StageReader(stage_of(GRID.replace("SCHEME", scheme)), complexity="medium")
     (first,) = reader.read(0).meshes
     with monkeypatch.context() as patched:
-        for module, name in ((cutting, "triangulate"), (geometry, "read_mesh"), (refiner, "refine")):
+        for module, name in ((cutting, "triangulate"), (shape, "read_mesh"), (refiner, "refine")):
             patched.setattr(module, name, lambda *_: pytest.fail("made again"))
         (held,), (moved,) = reader.read(3).meshes, reader.read(10).meshes
     assert held is first
