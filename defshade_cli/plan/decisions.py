@@ -24,6 +24,16 @@ class Decision:
 
 def explain(plan: Plan) -> Iterator[Decision]:
     """Decision by decision, in the order of the pipeline."""
+    yield from _of_planes(plan)
+    yield from _of_lights(plan)
+    yield from _of_shadows(plan)
+    yield from _of_skies(plan)
+    yield from _of_surfaces(plan)
+    yield from _of_samples(plan)
+    yield _explain_redrawing(plan)
+
+
+def _of_planes(plan: Plan) -> Iterator[Decision]:
     yield Decision("layout", plan.layout, "as asked")
     converted = "authored colours are converted to it"
     yield Decision("render space", plan.render_space.name, "as authored" if plan.render_space.is_rec709 else converted)
@@ -31,6 +41,9 @@ def explain(plan: Plan) -> Iterator[Decision]:
     for plane in PLANES:
         kept = plane in plan.planes or plane in plan.data_planes
         yield _kept(f"plane {plane.name}", kept, "a material or layer needs it", "nothing needs it")
+
+
+def _of_lights(plan: Plan) -> Iterator[Decision]:
     for volume in ("quad", "sphere", "cone"):
         count = sum(planned.volume == volume for planned in plan.lights)
         yield Decision(f"{volume} volumes", f"{count} drawn" if count else "skipped", "lights that reach geometry")
@@ -41,23 +54,34 @@ def explain(plan: Plan) -> Iterator[Decision]:
     yield _kept("light in parts", parts, "layers show lobes, groups or shadows", "no layer shows a part of the light")
     plain = "one sample of lights that are points"
     yield _kept("blur of highlights", plan.cell_parts > 0, "over what a sample stands for", plain)
-    yield _explain_shadows(plan)
+
+
+def _of_shadows(plan: Plan) -> Iterator[Decision]:
+    yield _explain_maps(plan)
     if plan.shadows:
         yield _explain_backs(plan)
     yield _kept("IES profiles", bool(plan.profiles), "a light is shaped by one", "no light has one")
     yield _kept("shadow linking", plan.shadow_linked, "a light chooses its casters", "everything casts shadows")
+
+
+def _of_skies(plan: Plan) -> Iterator[Decision]:
     yield _kept("environment", bool(plan.domes), "a dome lights the scene", "no dome")
     yield _explain_rays(plan)
     if plan.portals:
         yield Decision("portals", "passed over", "hints: domes are sampled by their radiance")
+
+
+def _of_surfaces(plan: Plan) -> Iterator[Decision]:
     yield _kept("cutout", plan.cutout, "some opacity is or may be below 1", "no opacity is below 1")
     if plan.solid:
-        yield Decision(
-            "opacity images", f"{plan.solid} passed over", "1 wherever they are seen: these surfaces are solid"
-        )
+        solid = "1 wherever they are seen: these surfaces are solid"
+        yield Decision("opacity images", f"{plan.solid} passed over", solid)
     glass = "some opacity scales the diffuse alone: lobes stay"
     yield _kept("transparency", plan.transparent, glass, "no opacity does that")
     yield _kept("textures", plan.textures, "a material reads them", "no material reads any")
+
+
+def _of_samples(plan: Plan) -> Iterator[Decision]:
     yield _explain_motion(plan)
     if plan.data_layers:
         jittered, shared = "the beauty's is jittered, quantised or dithered", "the beauty's own float sample serves"
@@ -65,10 +89,9 @@ def explain(plan: Plan) -> Iterator[Decision]:
     yield _kept("error estimate", plan.tracks_error, "as asked", "nothing needs it")
     if not plan.lit:
         yield Decision("lighting", "skipped", "no layer needs it")
-    yield _explain_redrawing(plan)
 
 
-def _explain_shadows(plan: Plan) -> Decision:
+def _explain_maps(plan: Plan) -> Decision:
     if not plan.shadows:
         return Decision("shadow maps", "skipped", "no light casts any, or none were asked")
     side = plan.shadow_resolution
