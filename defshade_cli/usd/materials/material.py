@@ -25,7 +25,7 @@ from defshade_cli.usd.materials.texture import Unreadable, read_texture_input
 from defshade_cli.usd.polygons.primvars import DISPLAY_COLOR
 from defshade_cli.usd.values import is_finite
 
-_FIELDS = {
+FIELDS = {
     "diffuseColor": "diffuse_color",
     "emissiveColor": "emissive_color",
     "useSpecularWorkflow": "use_specular_workflow",
@@ -156,10 +156,10 @@ def _read_inputs(shader: UsdShade.Shader, network: Network, skipped: tuple[str, 
 
 
 def _take(inputs: _Inputs, name: str, value: Any) -> None:
-    if _FIELDS.get(name) not in _DEFAULTS or value is None:
+    if FIELDS.get(name) not in _DEFAULTS or value is None:
         return
     try:
-        inputs.values[_FIELDS[name]] = as_field(value, _DEFAULTS[_FIELDS[name]])
+        inputs.values[FIELDS[name]] = as_field(value, _DEFAULTS[FIELDS[name]])
     except (TypeError, ValueError):
         inputs.left_out.append(f"{name} ({type(value).__name__})")
 
@@ -172,13 +172,13 @@ def _take_from_node(inputs: _Inputs, name: str, output: Usd.Attribute) -> None:
         _take_from_display(inputs, name, node, str(varname))
         return
     _take(inputs, name, _fallback(inputs.network, node, output.GetBaseName()))
-    if identifier == "UsdUVTexture" and _FIELDS.get(name) in TEXTURED_FIELDS:
+    if identifier == "UsdUVTexture" and FIELDS.get(name) in TEXTURED_FIELDS:
         try:
-            inputs.textures[_FIELDS[name]] = read_texture_input(inputs.network, output)
+            inputs.textures[FIELDS[name]] = read_texture_input(inputs.network, output)
         except Unreadable as reason:
             inputs.left_out.append(f"{name} ({reason})")
-    elif varname and isinstance(_DEFAULTS.get(_FIELDS.get(name, "")), float | tuple):
-        inputs.primvars[_FIELDS[name]] = str(varname)
+    elif varname and isinstance(_DEFAULTS.get(FIELDS.get(name, "")), float | tuple):
+        inputs.primvars[FIELDS[name]] = str(varname)
     else:
         inputs.left_out.append(f"{name} (primvar {varname})" if varname else f"{name} ({identifier})")
 

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
+from defshade_cli.usd.materials.material import FIELDS
 from defshade_cli.usd.materials.materialx.surface import Model, Translation
 
-_SCALARS = {
-    "metallic": "metallic",
-    "roughness": "roughness",
-    "clearcoat": "clearcoat",
-    "clearcoatRoughness": "clearcoat_roughness",
-    "opacity": "opacity",
-    "opacityThreshold": "opacity_threshold",
-    "ior": "ior",
-}
-_COLORS = {"emissiveColor": "emissive_color", "specularColor": "specular_color"}
+_AS_THEY_ARE = (
+    *("metallic", "roughness", "clearcoat", "clearcoatRoughness", "opacity", "opacityThreshold", "ior"),
+    *("emissiveColor", "specularColor"),
+)
+"""Inputs that say what those of UsdPreviewSurface do."""
 
 
 def _translate(to: Translation) -> None:
     to.put_base("diffuseColor", "")
-    for name, target in (_SCALARS | _COLORS).items():
-        to.put(target, to[name], name)
+    for name in _AS_THEY_ARE:
+        to.put(FIELDS[name], to[name], name)
     to.values["use_specular_workflow"] = bool(to["useSpecularWorkflow"].bias.any())
     to.values["opacity_mode"] = "presence" if to["opacityMode"].bias.any() else "transparent"
     to.put_normal("normal")
