@@ -77,3 +77,18 @@ def test_a_prim_without_coordinates_is_read_at_the_readers_fallback(tmp_path: Pa
     assert read_at.uv == uv
     if not uv:  # turned by 90 degrees, scaled and moved, as COORDINATES says
         np.testing.assert_allclose(read_at.texture_from_uv, [[0, 0, 4 - 0.25 * 3], [0, 0, 5 + 0.5 * 2]], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("body", "left_out"),
+    [
+        ("float inputs:displacement = 0\nnormal3f inputs:normal = (0, 0, 1)", []),
+        ("float inputs:displacement = 0.5", ["without displacement (the same everywhere)"]),
+        ("normal3f inputs:normal = (1, 0, 0)", ["without normal (the same everywhere)"]),
+        ("float inputs:metallic.connect = </m/gone.outputs:r>", ["without metallic (connected to nothing)"]),
+    ],
+)
+def test_what_a_surface_says_in_vain_is_named(body: str, left_out: list[str]) -> None:
+    scene = read(f'{surface("m", body)}\ndef Cube "cube" {BINDS} {{\nrel material:binding = </m>\n}}')
+    assert scene.materials == (Material("/m"),)
+    assert reasons(scene, "/m") == left_out

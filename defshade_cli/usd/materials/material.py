@@ -43,6 +43,9 @@ FIELDS = {
 }
 """UsdPreviewSurface inputs and the fields they fill; a normal only from a texture."""
 
+_NEUTRAL: dict[str, Any] = {"displacement": 0.0, "normal": (0.0, 0.0, 1.0)}
+"""Constants that change nothing, of inputs of which no other constant is drawn."""
+
 _WITHOUT_EFFECT = ("occlusion",)
 """Inputs that direct light does not see: occlusion dims what comes from all around. Only a layer shows it."""
 
@@ -146,13 +149,24 @@ def _read_inputs(shader: UsdShade.Shader, network: Network, skipped: tuple[str, 
     for authored in shader.GetInputs():
         name = authored.GetBaseName()
         source = network.source(shader, name)
+        if source is None and _is_adrift(authored.GetAttr()):
+            inputs.left_out.append(f"{name} (connected to nothing)")
         if source is None or name in skipped:
             continue
         if computed(source):
             _take_from_node(inputs, name, source)
+        elif name in _NEUTRAL:
+            if network.of(source) not in (None, _NEUTRAL[name]):
+                inputs.left_out.append(f"{name} (the same everywhere)")
         else:
             _take(inputs, name, network.of(source))
     return inputs
+
+
+def _is_adrift(attribute: Usd.Attribute) -> bool:
+    """Is it connected to what the stage lacks?"""
+    stage, targets = attribute.GetStage(), attribute.GetConnections()
+    return bool(targets) and not any(stage.GetPropertyAtPath(target) for target in targets)
 
 
 def _take(inputs: _Inputs, name: str, value: Any) -> None:
