@@ -64,3 +64,24 @@ def test_images_too_where_a_scale_and_a_bias_say_it(
     read_as = found.inputs["diffuse_color"]
     np.testing.assert_allclose((read_as.scale[:3], read_as.bias[:3]), ((scale,) * 3, (bias,) * 3), atol=1e-6)
     assert lost == []
+
+
+def test_an_unlit_surface_shines_and_reflects_nothing(tmp_path: Path) -> None:
+    inputs = "float inputs:emission = 2\ncolor3f inputs:emission_color = (0.1, 0.2, 0.3)\nfloat inputs:opacity = 0.5"
+    found, lost = read(tmp_path, "ND_surface_unlit", inputs)
+    assert (found.diffuse_color, found.metallic, found.opacity, lost) == ((0, 0, 0), 1.0, 0.5, [])
+    np.testing.assert_allclose(found.emissive_color, (0.2, 0.4, 0.6), rtol=1e-6)
+
+
+@pytest.mark.parametrize(("said", "space"), [("sRGB", "sRGB"), ("raw", "raw"), ("auto", "auto"), ("", "raw")])
+def test_a_uv_texture_may_state_its_space_as_outside_materialx(tmp_path: Path, said: str, space: str) -> None:
+    stated = f'string inputs:sourceColorSpace = "{said}"' if said else ""
+    inputs = f"asset inputs:file = @wood.png@\n{stated}"
+    image = node("made", "ND_UsdUVTexture_23", inputs, "color3f outputs:rgb")
+    found, _ = read(tmp_path, GLTF, "color3f inputs:base_color.connect = </m/made.outputs:rgb>", image)
+    assert found.inputs["diffuse_color"].texture.color_space == space
+
+
+def test_a_materialx_surface_that_is_not_understood_is_named(tmp_path: Path) -> None:
+    _, lost = read(tmp_path, "ND_disney_principled")
+    assert lost == ["surface ND_disney_principled is not UsdPreviewSurface"]

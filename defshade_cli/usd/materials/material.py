@@ -119,7 +119,8 @@ def _surface_of(material: UsdShade.Material) -> tuple[UsdShade.Shader, str]:
         identifier = str(shader.GetShaderId() or "")
         if _is_understood(identifier):
             return shader, identifier
-    return sources[0], str(sources[0].GetShaderId() or "") if sources[0] else ""
+    shader = next((found for found in sources if found and found.GetShaderId()), sources[0])
+    return shader, str(shader.GetShaderId() or "") if shader else ""
 
 
 def _is_understood(identifier: str) -> bool:

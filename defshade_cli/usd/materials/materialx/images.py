@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from pxr import Sdf, UsdShade
 
-from defshade_cli.scene.texture import Texture, Wrap
+from defshade_cli.scene.texture import STATED_SPACES, ColorSpace, Texture, Wrap
 from defshade_cli.usd.materials.materialx.color_spaces import color_space
 from defshade_cli.usd.materials.materialx.coordinates import Coordinates, gltf_placed, read_coordinates, tiled
 from defshade_cli.usd.materials.materialx.graph import Graph
@@ -96,11 +96,17 @@ def _read(
     texture = Texture(
         tiles,
         udim=UsdShade.UdimUtils.IsUdimIdentifier(asset.path),
-        color_space=color_space(attribute, graph.lost),
+        color_space=_stated(graph, node) or color_space(attribute, graph.lost),
         wrap_s=_wrap(graph, node, names.u),
         wrap_t=_wrap(graph, node, names.v),
     )
     return texel(Lookup(texture, coordinates.uv, coordinates.affine), width)
+
+
+def _stated(graph: Graph, node: UsdShade.Shader) -> ColorSpace:
+    """As UsdUVTexture says it outside MaterialX, of which exporters leave it on the node; empty for nothing."""
+    said = graph.text(node, "sourceColorSpace", "")
+    return said if said in STATED_SPACES else ""
 
 
 def _wrap(graph: Graph, node: UsdShade.Shader, name: str) -> Wrap:

@@ -11,6 +11,7 @@ from defshade_cli.usd.materials.materialx.open_pbr import OPEN_PBR
 from defshade_cli.usd.materials.materialx.preview_surface import PREVIEW_SURFACE
 from defshade_cli.usd.materials.materialx.standard_surface import STANDARD_SURFACE
 from defshade_cli.usd.materials.materialx.surface import Model, Translation
+from defshade_cli.usd.materials.materialx.unlit import UNLIT
 from defshade_cli.usd.materials.network import Network
 
 MODELS: dict[str, Model] = {
@@ -21,6 +22,7 @@ MODELS: dict[str, Model] = {
     ),
     "ND_open_pbr_surface_surfaceshader": OPEN_PBR,
     "ND_gltf_pbr_surfaceshader": GLTF_PBR,
+    "ND_surface_unlit": UNLIT,
 }
 
 
