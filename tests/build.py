@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.geometry import Drawable, Mesh, Subset
-from defshade_cli.scene.light import DistantLight, Light, Shaping, SphereLight
+from defshade_cli.scene.light import DistantLight, Light, SphereLight
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Scene
+from defshade_cli.scene.shaping import Shaping
 from defshade_cli.spaces import Matrix, translation
 
 GREY = Material("/grey", diffuse_color=(0.5, 0.5, 0.5))

@@ -17,8 +17,9 @@ from defshade_cli.measure.light import ies_factor, irradiance_at
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.ies import IesError, IesProfile, parse_ies
-from defshade_cli.scene.light import Light, Shaping
+from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import Material
+from defshade_cli.scene.shaping import Shaping
 from defshade_cli.settings import RenderSettings
 from defshade_cli.usd.reader import StageReader
 from stages import reasons, stage_of

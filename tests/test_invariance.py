@@ -15,20 +15,12 @@ from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.environment import Environment
 from defshade_cli.scene.ies import parse_ies
-from defshade_cli.scene.light import (
-    CylinderLight,
-    DiskLight,
-    DistantLight,
-    DomeLight,
-    Light,
-    RectLight,
-    Shaping,
-    SphereLight,
-)
+from defshade_cli.scene.light import CylinderLight, DiskLight, DistantLight, DomeLight, Light, RectLight, SphereLight
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.mesh_light import MeshLight
 from defshade_cli.scene.radiance_map import RadianceMap
 from defshade_cli.scene.scene import Scene
+from defshade_cli.scene.shaping import Shaping
 from defshade_cli.settings import RenderSettings
 from defshade_cli.spaces import Matrix
 

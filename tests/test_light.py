@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from pxr import Usd, UsdLux
 
 from defshade_cli.plan import make_plan
-from defshade_cli.scene.light import CylinderLight, DiskLight, DistantLight, Light, RectLight, Shaping, SphereLight
+from defshade_cli.scene.light import CylinderLight, DiskLight, DistantLight, Light, RectLight, SphereLight
 from defshade_cli.scene.scene import Scene
+from defshade_cli.scene.shaping import Shaping
 from defshade_cli.settings import RenderSettings
 from defshade_cli.usd.lights.light import CAMERA_LIGHT, temperature_color
 from defshade_cli.usd.reader import StageReader

@@ -13,21 +13,13 @@ from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.passes.screen import WHOLE
 from defshade_cli.plan import Plan, make_plan
 from defshade_cli.scene.environment import Environment
-from defshade_cli.scene.light import (
-    CylinderLight,
-    DiskLight,
-    DistantLight,
-    DomeLight,
-    Light,
-    RectLight,
-    Shaping,
-    SphereLight,
-)
+from defshade_cli.scene.light import CylinderLight, DiskLight, DistantLight, DomeLight, Light, RectLight, SphereLight
 from defshade_cli.scene.linking import Links
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.radiance_map import RadianceMap
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.shadow import ShadowStyle
+from defshade_cli.scene.shaping import Shaping
 from defshade_cli.scene.triangle_tree import TriangleTree, triangle_tree
 from defshade_cli.settings import RenderSettings
 

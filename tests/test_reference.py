@@ -15,7 +15,8 @@ from build import at, bulb, rotated, sun
 from defshade_cli.measure.light import irradiance_at, shaping_factor
 from defshade_cli.measure.reference import Planes, reference_radiance, shade, surface_from_planes
 from defshade_cli.scene.camera import Camera
-from defshade_cli.scene.light import CylinderLight, DiskLight, Light, Shaping
+from defshade_cli.scene.light import CylinderLight, DiskLight, Light
+from defshade_cli.scene.shaping import Shaping
 from defshade_cli.spaces import translation
 
 CAMERA = Camera("/camera", at(0, 0, 5), (-0.8, 0.8, -0.45, 0.45), clipping_range=(0.1, 100.0))

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.scene.light import DistantLight, Light, Shaping
+from defshade_cli.scene.light import DistantLight, Light
+from defshade_cli.scene.shaping import Shaping
 from defshade_cli.spaces import normalize
 
 Array = NDArray[np.float64]

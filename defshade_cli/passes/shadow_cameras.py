@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.camera import Camera, Projection
 from defshade_cli.scene.emission import Emitter
-from defshade_cli.scene.light import Shaping
+from defshade_cli.scene.shaping import Shaping
 from defshade_cli.spaces import Matrix, Window, frame_along, transform_points
 
 _WIDEST_DEGREES = 60.0

@@ -2,7 +2,7 @@
 
     scene      all of a frame                  camera, window, view, framing   who looks, at what part, how large it is
     geometry   meshes and where they stand     material, texture               what they are made of
-    light      every kind of light             shadow, linking, studio         how it falls, on what, and one of our own
+    light, shaping   every kind of light       shadow, linking, studio         how it falls, on what, and one of our own
     identity   what stands behind each thing   motion   where it was           product, extras   what the stage asks for
 
 Light is looked up and sampled by

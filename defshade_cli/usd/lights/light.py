@@ -15,18 +15,10 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdLux
 
 from defshade_cli.scene.camera import Camera
-from defshade_cli.scene.light import (
-    CylinderLight,
-    DiskLight,
-    DistantLight,
-    DomeLight,
-    Light,
-    RectLight,
-    Shaping,
-    SphereLight,
-)
+from defshade_cli.scene.light import CylinderLight, DiskLight, DistantLight, DomeLight, Light, RectLight, SphereLight
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.scene.shadow import ShadowStyle
+from defshade_cli.scene.shaping import Shaping
 from defshade_cli.usd.blame import mistyped
 from defshade_cli.usd.color_space import in_rec709
 from defshade_cli.usd.lights.dome import is_dome, pole, sky_texture
