@@ -185,7 +185,14 @@ def test_a_render_imports_no_module_before_it_needs_it() -> None:
         *("usd.instancing.point_instancer", "usd.materials.materialx.document", "usd.opening.mask"),
         *("image.texture", "image.reading", "image.look", "image.encoders.exr", "image.false_colour"),
         *("scene.ies", "scene.motion", "scene.studio", "scene.radiance_map", "scene.triangle_tree"),
-        *("plan.shadow_reach", "passes.batch_means", "passes.volumes", "passes.motion", "cli.contained"),
+        *(
+            "plan.shadow_reach",
+            "passes.batch_means",
+            "passes.volumes",
+            "passes.debug_volumes",
+            "passes.motion",
+            "cli.contained",
+        ),
     }
     code = "import sys, defshade_cli.cli.render, defshade_cli.rendering; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)

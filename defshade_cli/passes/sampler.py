@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cache
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,6 @@ from defshade_cli.gpu.draw_list import DrawList
 from defshade_cli.image.film import Sampling
 from defshade_cli.passes.accumulation import AccumulationPass
 from defshade_cli.passes.changed_tiles import Layers
-from defshade_cli.passes.debug_volumes import DebugVolumesPass, laid_over
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.geometry import Geometry
 from defshade_cli.passes.identification import Manifests, Mattes
@@ -26,6 +26,9 @@ from defshade_cli.passes.sky_visibility import SkyVisibility
 from defshade_cli.passes.stopping import Stopping
 from defshade_cli.plan import Plan, ShutterSample
 from defshade_cli.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from defshade_cli.passes.debug_volumes import DebugVolumesPass
 
 
 class Sampler:
@@ -43,11 +46,10 @@ class Sampler:
         *,
         lone: bool,
     ) -> None:
-        self._frame, self._scouted = frame, Frame(gpu)
+        self._gpu, self._frame, self._scouted = gpu, frame, Frame(gpu)
         self._geometry, self._lighting = geometry, lighting
         self._accumulation, self._stopping = accumulation, stopping
         self._mask, self._lone = mask, lone
-        self._debug_volumes_pass = cache(lambda: DebugVolumesPass(gpu))
 
     def layers(
         self, draws: DrawList, scene: Scene, plan: Plan, moments: Iterator[ShutterSample] | None, known: Known
@@ -109,11 +111,19 @@ class Sampler:
             self._mask.let_go_of_textures(canvas.targets.radiance)
         beauty = self._accumulation.mean(counts)
         if lit.plan.debug == "volumes":
-            beauty = laid_over(beauty, self._volumes(lit, canvas))
+            beauty = self._with_volumes(beauty, lit, canvas)
         return {"beauty": beauty, "alpha": beauty[..., 3:]} | canvas.targets.layers(counts)
 
-    def _volumes(self, lit: LitScene, canvas: Canvas) -> NDArray[np.float32]:
-        """The light volumes as the pixels' centres see them."""
+    def _with_volumes(self, beauty: NDArray[np.float32], lit: LitScene, canvas: Canvas) -> NDArray[np.float32]:
+        """The light volumes as the pixels' centres see them, laid over an image (H, W, 4)."""
+        from defshade_cli.passes.debug_volumes import laid_over
+
         self._geometry.draw(lit.draws, lit.plan, canvas.gbuffer, CENTRE)
         target = self._frame.radiance("debug", lit.plan.size, canvas.gbuffer)
-        return self._debug_volumes_pass().draw(lit.plan, lit.tables, target, canvas.gbuffer.layout)
+        return laid_over(beauty, self._volumes_pass.draw(lit.plan, lit.tables, target, canvas.gbuffer.layout))
+
+    @cached_property
+    def _volumes_pass(self) -> DebugVolumesPass:
+        from defshade_cli.passes.debug_volumes import DebugVolumesPass
+
+        return DebugVolumesPass(self._gpu)
