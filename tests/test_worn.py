@@ -9,7 +9,7 @@ import pytest
 
 from defshade_cli.scene.material import Material
 from stages import reasons
-from test_material import BINDS, READER, network, read, read_inputs, surface
+from test_material import BINDS, DIFFUSE_FROM_READER, READER, network, read, read_inputs, surface
 
 
 def metallic_of(primvars: str, kind: str = "float") -> dict[str, float]:
@@ -92,3 +92,42 @@ def test_what_a_surface_says_in_vain_is_named(body: str, left_out: list[str]) ->
     scene = read(f'{surface("m", body)}\ndef Cube "cube" {BINDS} {{\nrel material:binding = </m>\n}}')
     assert scene.materials == (Material("/m"),)
     assert reasons(scene, "/m") == left_out
+
+
+TINTED = surface("m", DIFFUSE_FROM_READER, READER.format(type="float3", name="tint", fallback=""))
+TINTS = {"a": (1, 0, 0), "b": (0, 1, 0)}
+
+
+def test_instances_have_the_colour_that_they_inherit_of_any_primvar() -> None:
+    """Not that of their displayColor, which the material does not read."""
+    copies = (
+        f'def Xform "{name}" (\ninstanceable = true\ninherits = </tree>\n) {{\n'
+        f"color3f primvars:tint = {tint}\ncolor3f primvars:displayColor = (0, 0, 1)\n}}\n"
+        for name, tint in TINTS.items()
+    )
+    scene = read(TINTED + "class " + RUSTY % ("tree", "") + "".join(copies))
+    colors = {p: tuple(c) for d in scene.drawables for p, c in zip(d.paths, d.display_color.tolist(), strict=True)}
+    assert colors == {f"/{name}/cube": tint for name, tint in TINTS.items()}
+
+
+def test_copies_have_their_own_colour_of_any_primvar_but_no_numbers() -> None:
+    readers = (
+        READER.format(type="float3", name="tint", fallback="")
+        + "\n"
+        + READER.format(type="float", name="rust", fallback="").replace('"reader"', '"number"')
+    )
+    inputs = f"{DIFFUSE_FROM_READER}\nfloat inputs:metallic.connect = </m/number.outputs:result>"
+    swarm = f"""def PointInstancer "swarm" {{
+        point3f[] positions = [(0, 0, 0), (3, 0, 0)]
+        int[] protoIndices = [0, 0]
+        color3f[] primvars:tint = {list(TINTS.values())} (interpolation = "vertex")
+        float[] primvars:rust = [0, 1] (interpolation = "vertex")
+        rel prototypes = </swarm/p>
+        {"def " + RUSTY % ("p", "")}
+    }}"""
+    scene = read(surface("m", inputs, readers) + swarm)
+    (drawn,) = scene.drawables
+    assert [tuple(color) for color in drawn.display_color.tolist()] == list(TINTS.values())
+    assert scene.materials[0].metallic == 0.0
+    reason = "primvars:rust of /swarm is left out: only colours may differ between copies"
+    assert reasons(scene, "/swarm/p/cube") == [reason]

@@ -14,7 +14,7 @@ from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.blame import blamed
-from defshade_cli.usd.instancing.instancing import Piece, Standing, finite, place
+from defshade_cli.usd.instancing.instancing import Piece, Placement, Standing, finite, place
 from defshade_cli.usd.instancing.native_instances import NativeInstances, rebound
 from defshade_cli.usd.kind import Kind, Nature
 from defshade_cli.usd.memory import Memory
@@ -157,7 +157,7 @@ class Traversal:
             if key not in self._prototypes:
                 children = first.prim.GetPrototype().GetChildren()
                 self._prototypes[key] = self._read(children, first.here.inside(first.prim))
-            placed = place(self._prototypes[key] or (), placement)
+            placed = self._placed(self._prototypes[key] or (), placement)
             held = self._memory.materials.binds_by_collection(first.prim.GetPath())
             yield from chain.from_iterable(rebound(piece, self._memory) for piece in placed) if held else placed
         for prim, reasons in instances.issues.items():
@@ -167,7 +167,6 @@ class Traversal:
         from defshade_cli.usd.instancing.point_instancer import has_varying_copies, read_point_instancer
 
         swarm = read_point_instancer(prim, self._time, self._base)
-        self.found.report(prim, *swarm.issues)
         self.found.dormant |= not swarm.placements and has_varying_copies(prim)
         for path, placement in swarm.placements:
             placed = replace(
@@ -177,7 +176,15 @@ class Traversal:
                 bindings=self._memory.materials.bindings(prim.GetPath()),
                 in_world=here.in_world,
             )
-            yield from place(self._point_prototype(path, prim, here), placed)
+            yield from self._placed(self._point_prototype(path, prim, here), placed)
+        self.found.report(prim, *swarm.issues)
+
+    def _placed(self, pieces: Iterable[Piece], placement: Placement) -> Iterator[Piece]:
+        """Each with the colours of the primvar that its materials read."""
+        for piece in pieces:
+            bound = [bindings.under(placement.bindings) for bindings in piece.bindings.values()]
+            color = self._memory.materials.color_by(bound, self._time)
+            yield from place([piece], placement.colored_by(color))
 
     def _point_prototype(self, path: Sdf.Path, instancer: Usd.Prim, here: Standing) -> tuple[Piece, ...]:
         """A prototype's subtree with its root's own transform; of what stands above it only the purpose counts."""

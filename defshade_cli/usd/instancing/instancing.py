@@ -9,7 +9,7 @@ NaN in arrays) and multiplies its matrices, in NumPy: instances of instances cos
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from itertools import chain, compress, repeat
 from typing import TYPE_CHECKING, NamedTuple
@@ -22,7 +22,7 @@ from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import StageError
 from defshade_cli.scene.light import Light
 from defshade_cli.usd.materials.binding import NOTHING_BOUND, Bindings
-from defshade_cli.usd.polygons.primvars import read_display
+from defshade_cli.usd.polygons.primvars import DISPLAY_COLOR, Elements, read_display
 from defshade_cli.usd.said import NOTHING_INHERITED, Inherited
 from defshade_cli.usd.surfaces.geometry import Surface
 from defshade_cli.usd.values import within_reach
@@ -100,6 +100,7 @@ class Placement:
     """Where copies of a subtree stand in the one above it; fields as in Piece.
 
     roots: path of each copy's root, which replaces `prototype` in the paths of its pieces; none where they share it.
+    other_color: what copies have of another primvar, in the place of display_color.
     """
 
     root_from_copy: NDArray[np.float64]
@@ -111,6 +112,13 @@ class Placement:
     in_world: bool = False
     prototype: str = ""
     roots: tuple[str, ...] = ()
+    other_color: Callable[[str], NDArray[np.float32]] | None = None
+
+    def colored_by(self, primvar: str) -> Placement:
+        """The same for pieces that read their colour from a primvar."""
+        if primvar == DISPLAY_COLOR or self.other_color is None:
+            return self
+        return replace(self, display_color=self.other_color(primvar))
 
 
 def place(pieces: Iterable[Piece], placement: Placement) -> Iterator[Piece]:
@@ -150,13 +158,23 @@ def read_display_of_instances(
     NaN where nothing is authored. As the PointInstancer schema says: constant and uniform values are everyone's, any
     other interpolation has one value a copy.
     """
-    elements = {"constant": 1, "uniform": 1, "varying": count, "vertex": count, "faceVarying": count}
-    color = read_display(prim, "displayColor", 3, time, elements, issues)
-    opacity = read_display(prim, "displayOpacity", 1, time, elements, issues)
+    opacity = read_display(prim, "displayOpacity", 1, time, _elements(count), issues)
     return (
-        np.broadcast_to(np.float32(np.nan) if color is None else color.values, (count, 3)),
+        read_color_of_instances(prim, time, count, issues, DISPLAY_COLOR),
         np.broadcast_to(np.float32(np.nan) if opacity is None else opacity.values, (count,)),
     )
+
+
+def read_color_of_instances(
+    prim: Usd.Prim, time: Usd.TimeCode, count: int, issues: list[str], primvar: str
+) -> NDArray[np.float32]:
+    """(count, 3) of displayColor, or of what is read in its place, likewise."""
+    color = read_display(prim, primvar, 3, time, _elements(count), issues)
+    return np.broadcast_to(np.float32(np.nan) if color is None else color.values, (count, 3))
+
+
+def _elements(count: int) -> Elements:
+    return {"constant": 1, "uniform": 1, "varying": count, "vertex": count, "faceVarying": count}
 
 
 def _placed(piece: Piece, placement: Placement) -> NDArray[np.float64]:

@@ -5,12 +5,21 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pxr import Sdf, Usd
 
-from defshade_cli.usd.instancing.instancing import Piece, Placement, Standing, read_display_of_instances, some
+from defshade_cli.usd.instancing.instancing import (
+    Piece,
+    Placement,
+    Standing,
+    read_color_of_instances,
+    read_display_of_instances,
+    some,
+)
 from defshade_cli.usd.materials.binding import Bindings
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.surfaces.geometry import Surface
@@ -68,6 +77,15 @@ class NativeInstances:
             read_display_of_instances(instance.prim, time, 1, self.issues.setdefault(instance.prim, []))
             for instance in instances
         ]
+
+        def other_color(primvar: str) -> NDArray[np.float32]:
+            issues = [self.issues[instance.prim] for instance in instances]
+            read = (
+                read_color_of_instances(i.prim, time, 1, told, primvar)
+                for i, told in zip(instances, issues, strict=True)
+            )
+            return np.concatenate([*read])
+
         return Placement(
             matrices([instance.here.root_from_prim for instance in instances]),
             np.array([instance.order for instance in instances], np.int32),
@@ -78,6 +96,7 @@ class NativeInstances:
             sharing.in_world,
             prototype=self._memory.names.name_prototype(first.GetPrototype(), first),
             roots=tuple(self._memory.names.shown(instance.prim.GetPath()) for instance in instances),
+            other_color=cache(other_color),
         )
 
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.dataclass import dataclass
-from defshade_cli.usd.instancing.instancing import Placement, read_display_of_instances
+from defshade_cli.usd.instancing.instancing import Placement, read_color_of_instances, read_display_of_instances
 from defshade_cli.usd.xform import matrices
 
 
@@ -18,11 +19,11 @@ from defshade_cli.usd.xform import matrices
 class Swarm:
     """A PointInstancer at one time: per prototype that it uses, the placement of its copies.
 
-    issues: what was left out, and why.
+    issues: what was left out, and why; what pieces ask of it later adds to it.
     """
 
     placements: tuple[tuple[Sdf.Path, Placement], ...] = ()
-    issues: tuple[str, ...] = ()
+    issues: Sequence[str] = ()
 
 
 def read_point_instancer(prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode) -> Swarm:
@@ -51,9 +52,10 @@ def read_point_instancer(prim: Usd.Prim, time: Usd.TimeCode, base: Usd.TimeCode)
             issues.append(f"{lost} {reason}")
         kept &= valid
     display = read_display_of_instances(prim, time, count, issues)
-    everyone = Placement(from_copy, _ids(instancer, base, count), *display)
+    other = cache(lambda primvar: read_color_of_instances(prim, time, count, issues, primvar))
+    everyone = Placement(from_copy, _ids(instancer, base, count), *display, other_color=other)
     sorted_rows = _by_value(indices, kept)
-    return Swarm(tuple((prototypes[k], _chosen(everyone, rows)) for k, rows in sorted_rows), tuple(issues))
+    return Swarm(tuple((prototypes[k], _chosen(everyone, rows)) for k, rows in sorted_rows), issues)
 
 
 def has_varying_copies(prim: Usd.Prim) -> bool:
@@ -102,12 +104,14 @@ def _ids(instancer: UsdGeom.PointInstancer, time: Usd.TimeCode, count: int) -> N
 
 
 def _chosen(placement: Placement, rows: NDArray[np.intp]) -> Placement:
+    other = placement.other_color
     return replace(
         placement,
         root_from_copy=placement.root_from_copy[rows],
         ids=placement.ids[rows],
         display_color=placement.display_color[rows],
         display_opacity=placement.display_opacity[rows],
+        other_color=other and (lambda primvar: other(primvar)[rows]),
     )
 
 

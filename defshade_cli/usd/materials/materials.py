@@ -69,7 +69,11 @@ class Materials:
     def color_of(self, prim: Usd.Prim, said: Said, subsets: Iterable[UsdGeom.Subset], time: Usd.TimeCode) -> str:
         """What stands for displayColor: the primvar that a material bound to the prim reads its colour from."""
         bound = [self._bound(said.path, prim, said), *[self._bound(str(s.GetPath()), s.GetPrim()) for s in subsets]]
-        return next((color for each in bound if (color := self._color_by(each.bindings, time))), DISPLAY_COLOR)
+        return self.color_by([each.bindings for each in bound], time)
+
+    def color_by(self, bound: Iterable[Bindings], time: Usd.TimeCode) -> str:
+        """The same of what is bound to a prim and its subsets, in order."""
+        return next((color for each in bound if (color := self._color_by(each, time))), DISPLAY_COLOR)
 
     def _color_by(self, bindings: Bindings, time: Usd.TimeCode) -> str:
         """The same of some bindings, empty where none does; found once for all prims with these."""

@@ -6,11 +6,11 @@ what it inherits.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, replace
 
 import numpy as np
-from pxr import Sdf, Usd
+from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.scene.material import Material
@@ -65,6 +65,7 @@ def _single(prim: Usd.Prim, name: str, time: Usd.TimeCode, issues: list[str]) ->
     primvar = find_display(prim, name)
     source = authored(primvar, time)
     if source is None or source.value is None:
+        issues.extend(_of_copies(prim, name))
         return None
     rows = np.asarray(source.value)
     if not primvar.GetTypeName().isArray:
@@ -75,3 +76,10 @@ def _single(prim: Usd.Prim, name: str, time: Usd.TimeCode, issues: list[str]) ->
         issues.append(f"{source.name} is left out: only colours may vary over a prim")
         return None
     return tuple(np.ravel(rows[0]).tolist())
+
+
+def _of_copies(prim: Usd.Prim, name: str) -> Iterator[str]:
+    """Why a prototype has not what its instancer says of each copy."""
+    while prim := prim.GetParent():
+        if prim.IsA(UsdGeom.PointInstancer) and UsdGeom.PrimvarsAPI(prim).GetPrimvar(name).HasAuthoredValue():
+            yield f"primvars:{name} of {prim.GetPath()} is left out: only colours may differ between copies"
