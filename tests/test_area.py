@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from build import at, beauty
+from build import at, beauty, camera, quad, scene
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.measure.area import area_radiance
 from defshade_cli.measure.error import relative_differences
@@ -67,6 +67,16 @@ def test_a_single_sample_is_near_the_integral(pipeline: Pipeline, stage: str) ->
 )
 def test_spread_holds_every_point_of_a_light(light: Light) -> None:
     assert light.spread == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("samples", [4, 64])
+def test_a_light_that_nearly_touches_a_surface_does_not_sparkle(pipeline: Pipeline, samples: int) -> None:
+    """Over a floor that shows 0.5 at most at the limit; by points alone the brightest pixels had 1314 and 84."""
+    panel = RectLight(path="/l", world_from_light=at(0, 0, 1e-3), color=(1, 1, 1), width=0.2, height=0.2)
+    plan = RenderSettings(size=(64, 64), shadows=False, samples=samples, light_points=1)
+    world = scene([quad(0.1)], [panel], view=camera(half=0.02))
+    image = beauty(pipeline.render(world, make_plan(world, plan)).layers)
+    assert 0.25 < image.max() < 4 * 0.5
 
 
 def _without_arguments(kind: type[Light]) -> Light:

@@ -48,6 +48,7 @@ def light_records(
         "profile": [_PROFILES.index(emitter.profile) for emitter in emitters],
         "intensity": [emitter.intensity for emitter in emitters],
         "extent": [emitter.extent for emitter in shown],
+        "falloff_limit": [emitter.falloff_limit for emitter in shown],
         "reach": np.array([planned.reach for planned in lights]) + aside,
         "response": [(planned.light.diffuse, planned.light.specular) for planned in lights],
         "radius": [emitter.radius for emitter in emitters],

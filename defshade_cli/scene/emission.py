@@ -66,6 +66,14 @@ class Emitter:
     radius: float = 0.0
     shown: Emitter | None = None
 
+    @property
+    def falloff_limit(self) -> float:
+        """What 1 / distance² counts as at most: no patch covers more than a hemisphere, extent / distance² of it.
+
+        Patches shrink with the number of samples, so that the mean still converges.
+        """
+        return 2.0 * math.pi / self.extent if self.extent else math.inf
+
     def shared_by(self, samples: int) -> Emitter:
         """One of `samples` points that stand for the light together."""
         return replace(self, extent=self.extent / samples)

@@ -109,5 +109,6 @@ vec3 irradiance_from(Light light, vec3 position, out vec3 l) {
     l = to_light * per_distance;
     if (distance_squared >= light.reach * light.reach) return vec3(0.0);
     vec3 from_point = light.is_whole != 0u ? normalize(light.position - position) : l;
-    return light.intensity * shaped(light, from_point) * (profile(light, -l) * per_distance * per_distance);
+    float falloff = min(per_distance * per_distance, light.falloff_limit);
+    return light.intensity * shaped(light, from_point) * (profile(light, -l) * falloff);
 }

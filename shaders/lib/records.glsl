@@ -90,6 +90,7 @@ struct Light {
     uint shadow_count;         // 0: casts none
     uint is_sky;               // one of the few directions that stand for a dome
     float extent;              // area that the point stands for; a distant light's solid angle; 0 for a point
+    float falloff_limit;       // of 1 / distance²: there `extent` covers all that a surface sees
     uint is_whole;             // it shines from its centre and shows in lobes as a whole; the sample's point casts its shadows
     uint by_rays;              // lobes see it by rays of each pixel's own as well
     vec3 right;                // unit, the light's X and Y: what an IES profile's horizontal angle is measured from
