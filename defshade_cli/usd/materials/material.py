@@ -20,28 +20,11 @@ from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.material import TEXTURED_FIELDS, UNBOUND, UV_SETS, Material
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.scene.texture import TextureInput
+from defshade_cli.usd.materials.fields import FIELDS
 from defshade_cli.usd.materials.network import Network, computed, node_of
 from defshade_cli.usd.materials.texture import Unreadable, read_texture_input
 from defshade_cli.usd.polygons.primvars import DISPLAY_COLOR
 from defshade_cli.usd.values import is_finite
-
-FIELDS = {
-    "diffuseColor": "diffuse_color",
-    "emissiveColor": "emissive_color",
-    "useSpecularWorkflow": "use_specular_workflow",
-    "specularColor": "specular_color",
-    "metallic": "metallic",
-    "roughness": "roughness",
-    "clearcoat": "clearcoat",
-    "clearcoatRoughness": "clearcoat_roughness",
-    "opacity": "opacity",
-    "opacityThreshold": "opacity_threshold",
-    "opacityMode": "opacity_mode",
-    "ior": "ior",
-    "occlusion": "occlusion",
-    "normal": "normal",
-}
-"""UsdPreviewSurface inputs and the fields they fill; a normal only from a texture."""
 
 _NEUTRAL: dict[str, Any] = {"displacement": 0.0, "normal": (0.0, 0.0, 1.0)}
 """Constants that change nothing, of inputs of which no other constant is drawn."""

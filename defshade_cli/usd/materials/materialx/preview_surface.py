@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from defshade_cli.usd.materials.material import FIELDS
+from defshade_cli.usd.materials.fields import FIELDS
 from defshade_cli.usd.materials.materialx.surface import Model, Translation
 
 _AS_THEY_ARE = (
