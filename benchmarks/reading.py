@@ -8,8 +8,8 @@ other work on the machine only adds. A triangle takes what it does in large mesh
 
 from __future__ import annotations
 
+import argparse
 import logging
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -189,11 +189,14 @@ def seconds_a_triangle(small: Cost, large: Cost) -> float:
     return more / (large.triangles / large.prims - small.triangles / small.prims)
 
 
-def main(paths: list[str]) -> None:
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("stages", nargs="*", type=Path)
+    paths = parser.parse_args().stages
     logging.disable()
     known = {name: measure(GENERATED[name]()) for name in (SMALL, LARGE)}
     a_triangle = seconds_a_triangle(known[SMALL], known[LARGE])
-    own: Stages = {Path(path).name: lambda path=path: Usd.Stage.Open(path) for path in paths}
+    own: Stages = {path.name: lambda path=path: Usd.Stage.Open(str(path)) for path in paths}
     print(f"us a triangle: {1e6 * a_triangle:.2f}\n")
     print(f"{'stage':36}{'seconds':>9}{'us a prim':>11}{'= prim':>9}{'+ triangles':>13}")
     for name, make in (own or GENERATED).items():
@@ -223,4 +226,4 @@ def _place(prim: UsdGeom.Xformable, number: int) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()
