@@ -164,7 +164,7 @@ def test_purposes_of_a_stage_by_others(assets: Path, name: str) -> None:
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ('def TetMesh "x" {\n}', "prims of type TetMesh are not drawn"),
+        ('def HermiteCurves "x" {\n}', "prims of type HermiteCurves are not drawn"),
         ('def GenerativeProcedural "x" {\n}', "prims of type GenerativeProcedural are not drawn"),
         ('def Hologram "x" {\n}', "no schema defines the type Hologram"),
     ],
@@ -209,8 +209,8 @@ def test_a_stage_without_geometry_is_empty(text: str) -> None:
 
 
 def test_an_empty_stage_says_what_is_left_out() -> None:
-    with pytest.raises(EmptyStage, match="nothing to draw: /p: prims of type TetMesh are not drawn"):
-        read('def TetMesh "p" {\n}')
+    with pytest.raises(EmptyStage, match="nothing to draw: /p: prims of type HermiteCurves are not drawn"):
+        read('def HermiteCurves "p" {\n}')
 
 
 def test_a_frame_in_which_all_is_hidden_for_a_while_is_a_picture_of_nothing() -> None:

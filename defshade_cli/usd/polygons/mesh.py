@@ -41,7 +41,7 @@ def read_mesh(
     Attributes are asked by name: a schema's accessors take half as long again.
     """
     names = said.names
-    points = _points(prim, said, time, issues)
+    points = points_of(prim, said, time, issues)
     counts, indices = _topology(prim, time, issues) if len(points) else (_NONE, _NONE)
     sizes = sizes_of(counts)
     is_whole = sizes.corners == len(indices) and _are_drawn(points, indices)
@@ -59,13 +59,14 @@ def read_mesh(
         holes=_holes(prim, time, len(counts), issues) if "holeIndices" in names else _NONE,
         scheme=scheme,
         left_handed="orientation" in names and prim.GetAttribute("orientation").Get() == UsdGeom.Tokens.leftHanded,
-        normals=_normals(prim, said, time, elements, issues) if scheme == "none" else None,
+        normals=normals_of(prim, said, time, elements, issues) if scheme == "none" else None,
         **carried._asdict(),
     )
-    return mend_normals(polygons if is_whole else _without_broken_faces(polygons, issues), issues)
+    return mend_normals(polygons if is_whole else without_broken_faces(polygons, issues), issues)
 
 
-def _points(prim: Usd.Prim, said: Said, time: Usd.TimeCode, issues: list[str]) -> NDArray[np.float32]:
+def points_of(prim: Usd.Prim, said: Said, time: Usd.TimeCode, issues: list[str]) -> NDArray[np.float32]:
+    """(P, 3) of what is based on points; none, and an issue, where it has no sound ones."""
     points = read_positions(prim, time) if "velocities" in said.names else still_positions(prim, time)
     if points is None or not len(points):
         type_name = prim.GetAttribute("points").GetTypeName()
@@ -159,19 +160,19 @@ def _holes(prim: Usd.Prim, time: Usd.TimeCode, faces: int, issues: list[str]) ->
     return holes[valid]
 
 
-def _normals(prim: Usd.Prim, said: Said, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> Primvar | None:
+def normals_of(prim: Usd.Prim, said: Said, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> Primvar | None:
     """primvars:normals wins over normals, unless it is of no use."""
     normals = None
     if "primvars:normals" in said.names:
         normals = fit(authored(UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals"), time), 3, elements, issues)
     if normals is None and "normals" in said.names:
-        mesh = UsdGeom.Mesh(prim)
-        value = Authored("normals", mesh.GetNormalsAttr().Get(time), mesh.GetNormalsInterpolation())
+        based = UsdGeom.PointBased(prim)
+        value = Authored("normals", based.GetNormalsAttr().Get(time), based.GetNormalsInterpolation())
         normals = fit(value, 3, elements, issues)
     return normals
 
 
-def _without_broken_faces(polygons: Polygons, issues: list[str]) -> Polygons:
+def without_broken_faces(polygons: Polygons, issues: list[str]) -> Polygons:
     """The faces of three corners and more, all of them at points that exist and are finite."""
     missing = (polygons.indices < 0) | (polygons.indices >= len(polygons.points))
     adrift = np.zeros_like(missing)

@@ -49,6 +49,10 @@ def read_shape(
         from defshade_cli.usd.curves.nurbs_curves import read_nurbs_curves
 
         return _along(read_nurbs_curves(UsdGeom.NurbsCurves(prim), time, issues, color))
+    if prim.IsA(UsdGeom.TetMesh):
+        from defshade_cli.usd.polygons.tets import read_tets
+
+        return Shape(read_tets(prim, said, time, issues, color))
     if prim.IsA(UsdGeom.NurbsPatch):
         from defshade_cli.usd.nurbs.nurbs import read_patch
 
@@ -78,6 +82,10 @@ def attributes_of(prim: Usd.Prim) -> tuple[str, ...]:
         from defshade_cli.usd.curves.nurbs_curves import NURBS_CURVES_ATTRIBUTES
 
         return NURBS_CURVES_ATTRIBUTES
+    if prim.IsA(UsdGeom.TetMesh):
+        from defshade_cli.usd.polygons.tets import TETS_ATTRIBUTES
+
+        return TETS_ATTRIBUTES
     if prim.IsA(UsdGeom.NurbsPatch):
         from defshade_cli.usd.nurbs.nurbs import PATCH_ATTRIBUTES
 
