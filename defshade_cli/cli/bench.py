@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from defshade_cli import __version__, settings
+from defshade_cli.cli.names import Names
 from defshade_cli.cli.options import Function, HeadedCommand, Option, epilog, make_job, take
 from defshade_cli.cli.options.stage import stage_options
 from defshade_cli.cli.progress import show_log
 from defshade_cli.cli.stats import plain
-from defshade_cli.cli.types import Counts, Names, Positive, Size, Whole
+from defshade_cli.cli.types import Counts, Positive, Size, Whole
 from defshade_cli.errors import OutputError, UsageError
 from defshade_cli.settings import RenderJob
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
+from defshade_cli.cli.names import Threshold
 from defshade_cli.cli.options import HeadedCommand, epilog
 from defshade_cli.cli.stats import plain
-from defshade_cli.cli.types import Threshold
 from defshade_cli.errors import UsageError
 from defshade_cli.settings import OutputSettings
 

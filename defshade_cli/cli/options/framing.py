@@ -6,8 +6,9 @@ import functools
 
 import click
 
+from defshade_cli.cli.names import Direction
 from defshade_cli.cli.options.option import Function, Option
-from defshade_cli.cli.types import Direction, Whole
+from defshade_cli.cli.types import Whole
 
 
 def framing_options() -> list[Function]:

@@ -8,9 +8,10 @@ from collections.abc import Sequence
 import click
 
 from defshade_cli import settings
+from defshade_cli.cli.names import Layers
 from defshade_cli.cli.options.option import Function, Option
 from defshade_cli.cli.options.sampling import sampling_options
-from defshade_cli.cli.types import Crop, Finite, Layers, Positive, Ranks, Size, Whole
+from defshade_cli.cli.types import Crop, Finite, Positive, Ranks, Size, Whole
 from defshade_cli.settings import RenderSettings
 
 _RENDER = RenderSettings()

@@ -7,8 +7,9 @@ import functools
 import click
 
 from defshade_cli import settings
+from defshade_cli.cli.names import file_completion
 from defshade_cli.cli.options.option import Function, Option
-from defshade_cli.cli.types import OneOf, file_completion
+from defshade_cli.cli.types import OneOf
 from defshade_cli.settings import OutputSettings
 
 _OUTPUT = OutputSettings()

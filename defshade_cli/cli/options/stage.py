@@ -8,9 +8,10 @@ from pathlib import Path
 import click
 
 from defshade_cli import settings
+from defshade_cli.cli.names import Names, PrimPaths, Variant
 from defshade_cli.cli.options.framing import framing_options
 from defshade_cli.cli.options.option import Function, Option
-from defshade_cli.cli.types import Frames, Names, PrimPaths, Variant
+from defshade_cli.cli.types import Frames
 from defshade_cli.settings import Composition
 
 _COMPOSITION = Composition()
