@@ -229,6 +229,25 @@ def test_a_model_without_bounds_is_reported() -> None:
     assert [issue.reason for issue in read(text).unsupported] == ["it has no bounds to draw"]
 
 
+def test_a_model_of_a_purpose_that_is_not_drawn_is_not_looked_into() -> None:
+    """The bounds that are drawn are those of other purposes."""
+    scene = read(model(mode("bounds"), name="a") + model(mode("bounds") + 'uniform token purpose = "guide"', name="b"))
+    assert (paths(scene), scene.unsupported) == ({"/a"}, ())
+
+
+def test_a_pass_hides_models_in_any_draw_mode() -> None:
+    hides = """def RenderSettings "settings" {
+    }
+    def RenderPass "pass" {
+        rel renderSource = </settings>
+        uniform bool collection:renderVisibility:includeRoot = 1
+        rel collection:renderVisibility:excludes = </b>
+    }
+    """
+    text = model(mode("bounds"), name="a") + model(mode("bounds"), name="b") + hides
+    assert paths(read(text, render_settings="/pass")) == {"/a"}
+
+
 def test_an_instance_may_be_replaced() -> None:
     text = f"""class Xform "tree" (kind = "component") {{
         def Cube "trunk" {{}}

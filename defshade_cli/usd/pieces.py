@@ -78,7 +78,7 @@ class PieceReader:
         found: list[Piece | Awaited | None] = []
         if is_light(said.schemas):
             found.append(self._light(prim, here))
-        if kind is Kind.GPRIM and here.purpose in (None, *self._purposes):
+        if kind is Kind.GPRIM and self._is_asked_for(here):
             found.append(self._gprim(prim, here, said))
         elif kind is Kind.UNDRAWN:
             self._found.report(prim, f"prims of type {prim.GetTypeName()} are not drawn")
@@ -112,11 +112,17 @@ class PieceReader:
         self._found.issues.update(dict.fromkeys(issues))
         return piece
 
-    def stand_in(self, prim: Usd.Prim, here: Standing) -> Piece:
-        """What is drawn in place of a model."""
+    def stand_in(self, prim: Usd.Prim, here: Standing) -> list[Piece]:
+        """What is drawn in place of a model, if its purpose is drawn."""
+        if not self._is_asked_for(here):
+            return []
         surface = self._memory.stand_in(prim, here.draw_mode or FULL)
         self._found.issues.update(dict.fromkeys(surface.issues))
-        return self._piece(prim, here, surface, {path: bound_to(path) for path in surface.groups})
+        return [self._piece(prim, here, surface, {path: bound_to(path) for path in surface.groups})]
+
+    def _is_asked_for(self, here: Standing) -> bool:
+        """Inside a prototype only its instances may tell."""
+        return here.purpose in (None, *self._purposes)
 
     def arrived(self, pieces: Sequence[Piece | Awaited]) -> list[Piece]:
         """The pieces with those that were awaited, whose surfaces are looked into together."""

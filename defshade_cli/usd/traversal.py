@@ -99,7 +99,8 @@ class Traversal:
         if here is None:
             return (), above
         if here.draw_mode not in (None, FULL) and takes_effect(prim):
-            pieces.append(self._reader.stand_in(prim, here))
+            if not self._is_hidden(prim):
+                pieces.extend(self._reader.stand_in(prim, here))
             return (), here
         is_hidden = self._is_hidden(prim)
         if not is_hidden:
