@@ -224,6 +224,14 @@ def test_a_frame_in_which_all_is_hidden_for_a_while_is_a_picture_of_nothing() ->
 
 # From frame to frame
 
+
+@pytest.mark.parametrize("metadata", ["", "startTimeCode = 1\nendTimeCode = 3"])
+def test_splines_move_with_or_without_a_range_of_times(metadata: str) -> None:
+    text = 'def Cube "c" {\ndouble size.spline = {\nbezier,\n1: 1; post linear,\n3: 3; post held,\n}\n}'
+    reader = StageReader(stage_of(text, metadata))
+    assert [np.ptp(reader.read(frame).meshes[0].points) for frame in (1, 2, 3)] == [1, 2, 3]
+
+
 MOVING = """def Cube "still" {
     double3 xformOp:translate.timeSamples = { 0: (0, 0, 0), 10: (10, 0, 0) }
     uniform token[] xformOpOrder = ["xformOp:translate"]

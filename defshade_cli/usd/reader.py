@@ -87,7 +87,7 @@ class StageReader:
         self._settings = read_settings(stage, render_settings, product)
         self._stage, self._purposes = stage, tuple(self._settings.purposes if purposes is None else purposes)
         self._levels: dict[str, int] = {}
-        self._still: Scene | None = None
+        self._last: Scene | None = None
         self._lights: dict[str, Light] = {}
         self._pass = read_pass(stage, render_settings)
         self._cameras = find_cameras(stage)
@@ -112,8 +112,9 @@ class StageReader:
         A frame in which everything is hidden for a while has no drawables. Raises EmptyStage where there is nothing
         to draw at any time, StageError for a camera that sees nothing.
         """
-        if self._still:
-            return replace(self._still, frame=frame)
+        if self._last and self.is_still:  # asked for no sooner than a second frame is
+            return replace(self._last, frame=frame)
+        self._last = None
         time = Usd.TimeCode.Default() if frame is None else Usd.TimeCode(frame)
         with facts.gathered_diagnostics(), blaming(self._stage):
             levels = self._levels = {}
@@ -123,7 +124,7 @@ class StageReader:
                 scene = replace(scene, neighbours=neighbours)
         self._tell(scene.unsupported)
         scene = lit(scene, studio=self._studio)
-        self._still = scene if self.is_still else None
+        self._last = scene
         return scene
 
     def read_shutter(self, scene: Scene, count: int) -> Iterator[Scene]:

@@ -78,18 +78,21 @@ def silence() -> Iterator[None]:
 
 
 def may_change(stage: Usd.Stage) -> bool:
-    """Is anything of the stage animated? Attributes are asked only where splines may be: in a range of time codes."""
+    """Is anything of the stage animated? Attributes are asked only where no layer has time samples: for splines."""
     layers = stage.GetUsedLayers(includeClipLayers=True)
     if any(layer.ListAllTimeSamples() for layer in layers):
         return True
-    ranged = stage.HasAuthoredTimeCodeRange() and stage.GetStartTimeCode() < stage.GetEndTimeCode()
-    return ranged and any(a.HasSpline() for prim in stage.TraverseAll() for a in prim.GetAuthoredAttributes())
+    return any(attribute.HasSpline() for prim in _all_prims(stage) for attribute in prim.GetAuthoredAttributes())
 
 
 def has_clips(stage: Usd.Stage) -> bool:
     """Do values come from value clips anywhere? What these alone say, is no authored property to USD."""
-    prims = chain(stage.TraverseAll(), *(Usd.PrimRange.AllPrims(prototype) for prototype in stage.GetPrototypes()))
-    return any(prim.HasAuthoredMetadata("clips") for prim in prims)
+    return any(prim.HasAuthoredMetadata("clips") for prim in _all_prims(stage))
+
+
+def _all_prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
+    """Those of prototypes too."""
+    return chain(stage.TraverseAll(), *(Usd.PrimRange.AllPrims(prototype) for prototype in stage.GetPrototypes()))
 
 
 def stage_name(stage: Usd.Stage) -> str:
