@@ -25,11 +25,11 @@ GLTF = "ND_gltf_pbr_surfaceshader"
 PREVIEW = "ND_UsdPreviewSurface_surfaceshader"
 
 
-def scene_of(folder: Path, text: str) -> Scene:
+def scene_of(folder: Path, text: str, body: str = "") -> Scene:
     """A cube with the material </m>, in a folder that has an image."""
     (folder / "wood.png").touch()
     stage = folder / "stage.usda"
-    stage.write_text(f'#usda 1.0\n{text}\ndef Cube "cube" {BINDS} {{\nrel material:binding = </m>\n}}')
+    stage.write_text(f'#usda 1.0\n{text}\ndef Cube "cube" {BINDS} {{\nrel material:binding = </m>\n{body}\n}}')
     return StageReader(open_stage(stage)).read(None)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from test_materialx import GLTF, WOOD, node, read
+from test_materialx import GLTF, PREVIEW, STANDARD, WOOD, node, read, scene_of, shaded
 
 RED = (0.5, 0.2, 0.1)
 GRAY = float(np.dot(RED, (0.2722287, 0.6740818, 0.0536895)))
@@ -85,3 +85,29 @@ def test_a_uv_texture_may_state_its_space_as_outside_materialx(tmp_path: Path, s
 def test_a_materialx_surface_that_is_not_understood_is_named(tmp_path: Path) -> None:
     _, lost = read(tmp_path, "ND_disney_principled")
     assert lost == ["surface ND_disney_principled is not UsdPreviewSurface"]
+
+
+@pytest.mark.parametrize(
+    ("reader", "inputs"),
+    [
+        ("ND_geompropvalue_float", 'string inputs:geomprop = "worn"\nfloat inputs:default = 0.25'),
+        ("ND_UsdPrimvarReader_float", 'string inputs:varname = "worn"\nfloat inputs:fallback = 0.25'),
+    ],
+)
+@pytest.mark.parametrize(
+    ("model", "name"), [(GLTF, "roughness"), (STANDARD, "specular_roughness"), (PREVIEW, "roughness")]
+)
+def test_numbers_come_from_primvars(tmp_path: Path, reader: str, inputs: str, model: str, name: str) -> None:
+    made = node("made", reader, inputs, "float outputs:out")
+    rough = f"float inputs:{name}.connect = </m/made.outputs:out>"
+    found, lost = read(tmp_path, model, rough, made)
+    assert (found.roughness, lost) == (0.25, [])
+    worn = scene_of(tmp_path, shaded(model, rough, made), "float primvars:worn = 0.75")
+    assert (worn.materials[0].roughness, worn.unsupported) == (0.75, ())
+
+
+def test_a_colour_from_a_primvar_has_the_nodes_default(tmp_path: Path) -> None:
+    inputs = 'string inputs:geomprop = "worn"\ncolor3f inputs:default = (0.25, 0.5, 1)'
+    base = "color3f inputs:base_color.connect = </m/made.outputs:out>"
+    found, _ = read(tmp_path, GLTF, base, node("made", "ND_geompropvalue_color3", inputs))
+    assert (found.color_primvar, found.diffuse_color) == ("worn", (0.25, 0.5, 1))

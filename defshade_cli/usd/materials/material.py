@@ -87,7 +87,12 @@ def read_material(
 
         translation = translate(shader, identifier, network, occlusion=occlusion)
         reason, left_out = f"lost of {identifier}:", list(translation.lost)
-        material = Material(shown_as, **sound(translation.values, left_out), inputs=translation.textures)
+        material = Material(
+            shown_as,
+            **sound(translation.values, left_out),
+            primvars=translation.primvars,
+            inputs=translation.textures,
+        )
     else:
         return not_understood(shown_as, _surface_named(prim, shader, identifier))
     left_out.extend(f"textures at primvar {name}" for name in material.uv_names[UV_SETS:])

@@ -9,11 +9,11 @@ _OPAQUE, _MASK = 0, 1
 
 def _translate(to: Translation) -> None:
     to.put_base("base_color", "")
-    to.put("metallic", to["metallic"], "metallic")
-    to.put("roughness", to["roughness"], "roughness")
+    to.put_plain("metallic", "metallic")
+    to.put_plain("roughness", "roughness")
     to.put_specular("specular", "specular_color", "ior", "metallic")
-    to.put("clearcoat", to["clearcoat"], "clearcoat")
-    to.put("clearcoat_roughness", to["clearcoat_roughness"], "clearcoat_roughness")
+    to.put_plain("clearcoat", "clearcoat")
+    to.put_plain("clearcoat_roughness", "clearcoat_roughness")
     to.put_product("emissive_color", "emissive_strength", "emissive")
     to.put_normal("normal")
     to.put_occlusion()

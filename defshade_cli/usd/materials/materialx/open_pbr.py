@@ -7,11 +7,11 @@ from defshade_cli.usd.materials.materialx.surface import Model, Translation
 
 def _translate(to: Translation) -> None:
     to.put_base("base_color", "base_weight")
-    to.put("metallic", to["base_metalness"], "base_metalness")
-    to.put("roughness", to["specular_roughness"], "specular_roughness")
+    to.put_plain("metallic", "base_metalness")
+    to.put_plain("roughness", "specular_roughness")
     to.put_specular("specular_weight", "specular_color", "specular_ior", "base_metalness")
-    to.put("clearcoat", to["coat_weight"], "coat_weight")
-    to.put("clearcoat_roughness", to["coat_roughness"], "coat_roughness")
+    to.put_plain("clearcoat", "coat_weight")
+    to.put_plain("clearcoat_roughness", "coat_roughness")
     to.put_product("emissive_color", "emission_luminance", "emission_color")
     to.put_transparency("geometry_opacity", "transmission_weight")
     to.put_normal("geometry_normal")

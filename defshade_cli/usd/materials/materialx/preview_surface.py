@@ -15,7 +15,7 @@ _AS_THEY_ARE = (
 def _translate(to: Translation) -> None:
     to.put_base("diffuseColor", "")
     for name in _AS_THEY_ARE:
-        to.put(FIELDS[name], to[name], name)
+        to.put_plain(FIELDS[name], name)
     to.values["use_specular_workflow"] = bool(to["useSpecularWorkflow"].bias.any())
     to.values["opacity_mode"] = "presence" if to["opacityMode"].bias.any() else "transparent"
     to.put_normal("normal")

@@ -41,7 +41,7 @@ class Translation:
     """From one shader's inputs to the fields of a Material. Nothing raises: what cannot be said is lost, and named.
 
     occlusion: is it to be read?
-    values: constants by field.  textures: what replaces them.  lost: inputs of the shader, with reasons.
+    values: constants by field.  textures, primvars: what replaces them.  lost: inputs of the shader, with reasons.
     """
 
     shader: UsdShade.Shader
@@ -50,6 +50,7 @@ class Translation:
     occlusion: bool
     values: dict[str, Any] = field(default_factory=dict)
     textures: dict[str, TextureInput] = field(default_factory=dict)
+    primvars: dict[str, str] = field(default_factory=dict)
     lost: dict[str, None] = field(default_factory=dict)
 
     def run(self) -> Translation:
@@ -108,15 +109,33 @@ class Translation:
 
     def put_base(self, name: str, weight: str) -> None:
         """diffuse_color; a primvar where the network reads nothing else."""
-        source = self.network.source(self.shader, name)
-        if source is not None and computed(source):
-            node, identifier = node_of(source)
-            attribute = "varname" if "UsdPrimvarReader" in identifier else "geomprop"
-            if varname := self.network.value(node, attribute):
-                self.values["uses_display_color"] = True
-                self.values["color_primvar"] = "" if varname == DISPLAY_COLOR else str(varname)
-                return
+        varname, fallback = self._primvar(name)
+        if varname:
+            self.values["uses_display_color"] = True
+            self.values["color_primvar"] = "" if varname == DISPLAY_COLOR else varname
+            if fallback is not None:
+                self.put("diffuse_color", constant(fallback), name)
+            return
         self.put_product("diffuse_color", weight, name) if weight else self.put("diffuse_color", self[name], name)
+
+    def put_plain(self, target: str, name: str) -> None:
+        """A field that is an input as it is; a primvar too where the network reads nothing else."""
+        varname, fallback = self._primvar(name)
+        if not varname:
+            self.put(target, self[name], name)
+            return
+        self.primvars[target] = varname
+        self.put(target, constant(self.model.defaults[name] if fallback is None else fallback), name)
+
+    def _primvar(self, name: str) -> tuple[str, Any]:
+        """The primvar that an input is, and what stands in for it; an empty name for anything else."""
+        source = self.network.source(self.shader, name)
+        if source is None or not computed(source):
+            return "", None
+        node, identifier = node_of(source)
+        read_as = ("varname", "fallback") if "UsdPrimvarReader" in identifier else ("geomprop", "default")
+        varname, fallback = (self.network.value(node, attribute) for attribute in read_as)
+        return str(varname or ""), fallback
 
     def put_occlusion(self) -> None:
         """Put the occlusion that was found beside the surface, if any."""
