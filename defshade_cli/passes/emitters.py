@@ -23,6 +23,7 @@ from defshade_cli.plan.points import share_shown
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.emission import Emitter, emitter_at, far_field, sky_emitter
 from defshade_cli.scene.environment import Environment
+from defshade_cli.scene.geometry import box_corners
 from defshade_cli.scene.light import DomeLight, Light, RectLight
 from defshade_cli.scene.mesh_light import MeshLight
 from defshade_cli.scene.scene import Scene
@@ -134,7 +135,7 @@ def shadow_extent(scene: Scene, plan: Plan) -> ShadowExtent:
     corners = np.concatenate(frustum) @ rotation.T
     low, high = np.maximum(bounds[0], corners.min(axis=0)), np.minimum(bounds[1], corners.max(axis=0))
     seen = np.stack([low, high]) if (low <= high).all() else bounds
-    return ShadowExtent(_corners(seen), _corners(bounds), plan.shadow_resolution)
+    return ShadowExtent(box_corners(seen), box_corners(bounds), plan.shadow_resolution)
 
 
 def _filtered_window(plan: Plan) -> Window:
@@ -143,10 +144,6 @@ def _filtered_window(plan: Plan) -> Window:
     reach = 0.5 * max(plan.filter_width - 1.0, 0.0)
     x, y = reach * (right - left) / plan.size[0], reach * (top - bottom) / plan.size[1]
     return left - x, right + x, bottom - y, top + y
-
-
-def _corners(box: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.array(list(product(*box.T)))
 
 
 def _lit_sample(planned: PlannedLight, emitter: Emitter, plan: Plan, extent: ShadowExtent) -> LitSample:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +24,7 @@ from defshade_cli.plan.points import cell_parts, rays_a_sample
 from defshade_cli.plan.solidity import solid_materials
 from defshade_cli.plan.texels import seen_texels
 from defshade_cli.scene.camera import Camera, image_size
+from defshade_cli.scene.geometry import box_corners
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.view import View
@@ -122,7 +122,7 @@ def _tight_clip(camera: Camera, bounds: NDArray[np.float64]) -> tuple[float, flo
     near, far = camera.clipping_range
     if not np.isfinite(bounds).all():
         return near, far
-    depth = -transform_points(camera.camera_from_world, np.array(list(product(*bounds.T))))[:, 2]
+    depth = -transform_points(camera.camera_from_world, box_corners(bounds))[:, 2]
     slack = SLACK * float(np.abs(depth).max())
     tight = max(near, float(depth.min()) - slack), min(far, float(depth.max()) + slack)
     return tight if tight[0] < tight[1] else (near, far)

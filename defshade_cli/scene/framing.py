@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.camera import Camera
+from defshade_cli.scene.geometry import box_corners
 from defshade_cli.spaces import Matrix, Window, translation
 
 THREE_QUARTER = (30.0, 20.0)
@@ -46,7 +47,7 @@ class Framing:
         box = bounds if np.isfinite(bounds).all() else np.array([[-0.5] * 3, [0.5] * 3])
         azimuth, elevation = self.direction
         around = world_from_front(up_axis) @ rotation(azimuth + self._turned(frame), elevation)
-        points = (_corners(box) - box.mean(axis=0)) @ around[:3, :3]
+        points = (box_corners(box) - box.mean(axis=0)) @ around[:3, :3]
         seen = _swept(points @ rotation(0.0, elevation)[:3, :3].T, elevation) if self.turn else points
         distance = _fitting_distance(seen, window)
         world_from_camera = translation(box.mean(axis=0)) @ around @ translation(np.array([0.0, 0.0, distance]))
@@ -88,11 +89,6 @@ def rotation(azimuth: float, elevation: float) -> Matrix:
     matrix = np.eye(4)
     matrix[:3, :3] = turned @ raised
     return matrix
-
-
-def _corners(box: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(8, 3)."""
-    return np.array(np.meshgrid(*box.T)).reshape(3, 8).T
 
 
 def _swept(points: NDArray[np.float64], elevation: float) -> NDArray[np.float64]:
