@@ -1,14 +1,18 @@
 """Skies: sampled without bias, and their irradiance in spherical harmonics."""
 
+import logging
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from defshade_cli.image.environment import sky_of
 from defshade_cli.passes.sampling import owen_sobol
 from defshade_cli.scene.distribution import GridDistribution
 from defshade_cli.scene.environment import Environment, harmonics, uniform_environment
+from defshade_cli.scene.light import DomeLight
 
 
 def gradient_sky(height: int = 64) -> Environment:
@@ -105,3 +109,17 @@ def test_balanced_directions_have_the_harmonics_of_their_sky() -> None:
     moments = harmonics(directions).T @ (factor * radiance) / len(drawn)
     cosine = np.array([np.pi, *[2.0 * np.pi / 3.0] * 3, *[np.pi / 4.0] * 5])
     assert_allclose(cosine[:, None] * moments, sky.irradiance_sh, atol=1e-9)
+
+
+def test_an_image_that_cannot_be_read_is_an_even_sky_and_said_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """In one line, whatever the library says."""
+    file = tmp_path / "sky.png"
+    file.write_bytes(b"\x89PNG\r\n\x1a\n but no more")
+    dome = DomeLight(path="/sky", world_from_light=np.eye(4), color=np.ones(3), texture=str(file))
+    with caplog.at_level(logging.WARNING):
+        assert sky_of(dome) is sky_of(dome)
+    (told,) = caplog.messages
+    assert told.startswith(f"/sky: {file} cannot be read: ") and "\n" not in told
+    assert np.ptp(sky_of(dome).radiance) == 0.0

@@ -29,10 +29,17 @@ def sky_of(light: DomeLight) -> Environment:
         return light.environment
     if not light.texture:
         return _EVEN
+    path = Path(light.texture)
+    return _sky_in(path, light.layout, path.stat().st_mtime_ns if path.exists() else 0, light.path)
+
+
+@lru_cache(maxsize=8)
+def _sky_in(path: Path, layout: SkyLayout, _changed: int, light: str) -> Environment:
+    """What the image of a light shows, which is said once where it cannot be read."""
     try:
-        return read_environment(Path(light.texture), light.layout)
+        return read_environment(path, layout)
     except OutputError as error:
-        log.warning("%s: %s; its sky is even", light.path, error)
+        log.warning("%s: %s; its sky is even", light, " ".join(str(error).split()))
         return _EVEN
 
 
