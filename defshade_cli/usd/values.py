@@ -25,6 +25,9 @@ def floats(value: object, width: int) -> NDArray[np.float32] | None:
         return array.astype(np.float32)
 
 
+_LONE = (float, int, str)
+"""What needs no array to be looked at; a bool is an int."""
+
 FARTHEST = 1e18
 """Where a scene ends: the squares of its lengths are numbers of float32 still."""
 
@@ -38,6 +41,8 @@ def within_reach(numbers: NDArray[Any]) -> NDArray[np.bool_]:
 
 def is_finite(value: object) -> bool:
     """No number in `value` is infinite or NaN; what holds no numbers is finite too."""
+    if isinstance(value, _LONE):
+        return not isinstance(value, float) or math.isfinite(value)
     array = np.asarray(value)
     return array.dtype.kind != "f" or bool(np.isfinite(array).all())
 
@@ -55,6 +60,8 @@ def integers(value: object) -> NDArray[np.integer] | None:
 
 def resembles(value: object, model: object) -> bool:
     """Is `value` of the kind that `model` is: as many numbers, or the same type?"""
+    if isinstance(value, _LONE) and type(value) is type(model):
+        return True
     array, like = np.asarray(value), np.asarray(model)
     if like.dtype.kind in "biuf":
         return array.dtype.kind in "biuf" and array.shape == like.shape

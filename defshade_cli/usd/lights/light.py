@@ -151,11 +151,11 @@ def _left_out(prim: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
         yield "light filters are ignored"
     if old := _of_old(prim):
         yield f"not read, since they lack the inputs: that they have since USD 21.02: {', '.join(old)}"
-    connected = [attr.GetName() for attr in prim.GetAuthoredAttributes() if attr.HasAuthoredConnections()]
-    if connected:
+    authored = {attribute.GetName(): attribute for attribute in prim.GetAuthoredAttributes()}
+    if connected := [name for name, attribute in authored.items() if attribute.HasAuthoredConnections()]:
         yield f"connections are ignored: {', '.join(connected)}"
-    authored = [attr for attr in prim.GetAuthoredAttributes() if attr.GetName().startswith(_INPUTS)]
-    if odd := [attr.GetName() for attr in authored if not is_finite(attr.Get(time))]:
+    inputs = {name: attribute for name, attribute in authored.items() if name.startswith(_INPUTS)}
+    if odd := [name for name, attribute in inputs.items() if not is_finite(attribute.Get(time))]:
         yield f"not finite, so the schema's own values count: {', '.join(odd)}"
     yield from mistyped(prim)
 

@@ -20,6 +20,9 @@ from defshade_cli.scene.linking import Links
 
 Bits = NDArray[np.bool_]
 
+_COLLECTION = "collection:"
+"""Of the names of what collections say. A light that says nothing of its own links everything."""
+
 
 def link(
     stage: Usd.Stage, lights: Sequence[Light], drawables: Sequence[Drawable]
@@ -41,9 +44,10 @@ def link(
 
 def _collections(stage: Usd.Stage, light: Light) -> tuple[Usd.CollectionMembershipQuery, ...]:
     """The light's and the shadow's, or nothing where both hold everything."""
-    api = UsdLux.LightAPI(stage.GetPrimAtPath(light.path)) if light.path.startswith("/") else None
-    if not api:
+    prim = stage.GetPrimAtPath(light.path) if light.path.startswith("/") else None
+    if not prim or not any(name.startswith(_COLLECTION) for name in prim.GetAuthoredPropertyNames()):
         return ()
+    api = UsdLux.LightAPI(prim)
     pair = tuple(
         c.ComputeMembershipQuery() for c in (api.GetLightLinkCollectionAPI(), api.GetShadowLinkCollectionAPI())
     )
