@@ -119,10 +119,11 @@ def test_shadow_maps_are_coarser_the_more_there_are(lights: int, side: int) -> N
     assert plan.shadow_resolution == side
 
 
-@pytest.mark.parametrize(("opacity", "side"), [(1.0, 1024), (0.5, 512)])
-def test_maps_of_a_dome_are_coarser_where_casters_let_light_through(opacity: float, side: int) -> None:
+@pytest.mark.parametrize(("opacity", "others", "side"), [(1.0, 1, 1024), (0.5, 1, 512), (1.0, 0, 512), (0.5, 0, 512)])
+def test_maps_under_a_dome_are_coarser_where_each_adds_little(opacity: float, others: int, side: int) -> None:
+    """And where casters may let light through, whatever else shines."""
     sky = DomeLight(path="/sky", world_from_light=np.eye(4), color=(1, 1, 1))
-    under = replace(SCENE, lights=(sky,), materials=(replace(GREY, opacity=opacity),))
+    under = replace(SCENE, lights=(sky, *[sun()] * others), materials=(replace(GREY, opacity=opacity),))
     plan = make_plan(under, RenderSettings())
     assert plan.maps_a_sample > 64 and plan.shadow_resolution == side
 

@@ -36,6 +36,7 @@ class LightingVariant:
         0 for the plain equation.
     sky: points of a dome.  lobe_rays: lobes see some light by rays too.
     volumes: the kinds that some light has.  outputs: layers beside the radiance.  groups: those that one light is in.
+    shared: neighbouring pixels know of the shadows, see passes/shared_shadows.py.
     """
 
     planes: tuple[Plane, ...]
@@ -55,6 +56,7 @@ class LightingVariant:
     outputs: tuple[str, ...] = ()
     groups: int = 0
     space: RenderSpace = REC709
+    shared: bool = False
 
     @classmethod
     def of(
@@ -103,6 +105,7 @@ class LightingVariant:
             + [f"CELL_PARTS {self.cell_parts}"] * (self.cell_parts > 1)
             + ["SKY"] * self.sky
             + ["LOBE_RAYS"] * self.lobe_rays
+            + ["SHARED_SHADOWS"] * self.shared
             + space_defines(self.space)
         )
         return [plane.define for plane in self.planes] + flags + output_defines(self.outputs)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache
+from typing import Any
+
+from numpy.typing import NDArray
 
 from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.buffers import LIGHTS, RecordBuffer
@@ -28,11 +31,12 @@ from defshade_cli.passes.screen import Screen
 from defshade_cli.passes.shadow_atlas import ShadowAtlas
 from defshade_cli.passes.shadow_maps import MapRequest
 from defshade_cli.passes.shadows import ShadowPass, ShadowVariant
+from defshade_cli.passes.shared_shadows import SharedShadows, apart_from, shared_runs
 from defshade_cli.passes.sky_guide import SkyGuides
 from defshade_cli.passes.sky_textures import SkyTextures
 from defshade_cli.passes.sky_visibility import SkyVisibility, SkyVisibilityPass
 from defshade_cli.passes.tables import LightTables, TableStore
-from defshade_cli.plan import Plan
+from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.scene.scene import Scene
 
 
@@ -86,6 +90,7 @@ class SampleLighting:
         self._emission_pass = cache(lambda variant: EmissionPass(gpu, variant, screen))
         self._volumes_pass = cache(lambda variant: LightingPass(gpu, variant, screen))
         self._tiles, self._whole = LightTiles(gpu, frame), WholeLighting(gpu, screen)
+        self._shared = SharedShadows(gpu, frame)
         self._visibility_pass = cache(lambda variant: SkyVisibilityPass(gpu, variant, screen))
         self._environment_pass = cache(lambda variant: EnvironmentPass(gpu, variant, screen, skies))
         self._lobes = Lobes(gpu, frame, skies)
@@ -121,9 +126,17 @@ class SampleLighting:
         batches = light_batches(lit.scene, plan, sample, canvas.guides) if plan.lit else ()
         for number, batch in enumerate(batches):
             shadows = self._shadows(lit, sample, batch, number, canvas.known) if plan.shadows else None
-            self._add_batch(lit, batch, canvas, shadows)
+            lights, emitters = [each.planned for each in batch], [each.emitter for each in batch]
+            records = light_records(lights, emitters, plan.camera.position, shadows, lit.tables)
+            runs = shared_runs(lights, plan) if shadows else []
+            own = apart_from(len(lights), runs)
+            self._add_apart(lit, [lights[n] for n in own], records[own], canvas, shadows and shadows.part(own))
             if openness and visibility and shadows:
-                openness.add([each.planned for each in batch], plan, canvas.gbuffer, visibility, shadows)
+                self._records.write(records)
+                openness.add(lights, plan, canvas.gbuffer, visibility, shadows)
+            for run in runs:
+                assert shadows
+                self._add_shared(lit, lights[run], records[run], canvas, shadows.part(run))
 
     def _shadows(
         self, lit: LitScene, sample: Sample, batch: Sequence[LitSample], number: int, known: Known
@@ -135,11 +148,17 @@ class SampleLighting:
         shadow_pass.show(atlas)
         return atlas
 
-    def _add_batch(
-        self, lit: LitScene, batch: Sequence[LitSample], canvas: Canvas, shadows: ShadowAtlas | None
+    def _add_apart(
+        self,
+        lit: LitScene,
+        lights: Sequence[PlannedLight],
+        records: NDArray[Any],
+        canvas: Canvas,
+        shadows: ShadowAtlas | None,
     ) -> None:
-        lights, emitters = [each.planned for each in batch], [each.emitter for each in batch]
-        records = light_records(lights, emitters, lit.plan.camera.position, shadows, lit.tables)
+        """Lights whose shadows each pixel looks up by itself."""
+        if not len(records):
+            return
         self._records.write(records)
         gbuffer, targets = canvas.gbuffer, canvas.targets
         if lit.plan.lighting == "whole":
@@ -148,6 +167,18 @@ class SampleLighting:
             self._tiles.add(lights, records, gbuffer, targets, shadows, lit.tables)
         else:
             self._volumes_pass(lit.variant).add(lights, gbuffer, targets, shadows, lit.tables)
+
+    def _add_shared(
+        self,
+        lit: LitScene,
+        lights: Sequence[PlannedLight],
+        records: NDArray[Any],
+        canvas: Canvas,
+        shadows: ShadowAtlas,
+    ) -> None:
+        """Directions of a dome whose shadows pixels tell each other."""
+        seen = self._shared.see(lit.variant, lit.plan, canvas.gbuffer, shadows)
+        self._whole.add(lights, records, lit.plan, canvas.gbuffer, canvas.targets, None, lit.tables, seen)
 
     def _add_skies(self, lit: LitScene, canvas: Canvas) -> None:
         """Behind the geometry and in lobes, as far as it leaves them open."""

@@ -91,6 +91,11 @@ class ShadowAtlas:
         """Of all maps."""
         return self.rows_used * ATLAS
 
+    def part(self, lights: slice | NDArray[np.intp]) -> ShadowAtlas:
+        """The same for some of its lights."""
+        first, count, record = (row[lights] for row in (self.first, self.count, self.first_record))
+        return replace(self, first=first, count=count, first_record=record)
+
     def bind(self, program: moderngl.Program) -> moderngl.Texture:
         """Let `program` find texels; returns what holds them."""
         set_uniforms(program, self.uniforms)

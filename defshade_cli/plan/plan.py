@@ -15,6 +15,7 @@ from defshade_cli.plan.light_plan import LightPlan
 from defshade_cli.plan.moments import share_moments
 from defshade_cli.plan.planes import is_lit, primvar_names
 from defshade_cli.plan.redrawing import WHOLE, Redrawing
+from defshade_cli.plan.sharing import sharing_pixels
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.texture import Texture
 from defshade_cli.scene.window import DataWindow
@@ -83,6 +84,13 @@ class Plan(LightPlan):
         share = window.width * window.height / (self.window.width * self.window.height)
         limit = None if self.time_limit is None else self.time_limit * share
         return replace(self, window=window, camera=camera, time_limit=limit)
+
+    @property
+    def sharing_pixels(self) -> int:
+        """How many share what they look up of a dome's shadows; 1 where each pixel asks for all."""
+        if not self.shadows or "lightComplexity" in self.layers:  # which counts volumes
+            return 1
+        return sharing_pixels(self.lights, self.display)
 
     @property
     def textures(self) -> bool:

@@ -19,6 +19,9 @@ FINEST, FINE, COARSEST = 1024, 512, 128
 _FEW = range(2, 16)
 """Samples that FINE is enough for: at 8 relMSE of a stage with soft shadows is 1.04 times as large."""
 
+_MANY, _MANY_DIRECTIONS = 4, 64
+"""Points of each light, and directions of a dome among them, that FINE is enough for too."""
+
 _TEXELS = 64 * FINEST**2
 """Of all maps of a sample."""
 
@@ -40,7 +43,15 @@ def shadow_resolution(lights: Sequence[PlannedLight], samples: int, *, thin: boo
     sky_maps = math.inf if thin else _SKY_MAPS
     counted = sum(min(count_maps(p), sky_maps if isinstance(p.light, DomeLight) else math.inf) for p in lights)
     side = math.sqrt(_TEXELS / max(counted, 1))
-    return min(max(2 ** math.ceil(math.log2(side) - 0.5), COARSEST), FINE if samples in _FEW else FINEST)
+    finest = FINE if samples in _FEW or _are_many(lights) else FINEST
+    return min(max(2 ** math.ceil(math.log2(side) - 0.5), COARSEST), finest)
+
+
+def _are_many(lights: Sequence[PlannedLight]) -> bool:
+    """Does each map weigh little, under a dome?"""
+    casting = [planned for planned in lights if planned.light.casts_shadow]
+    least = min((planned.points for planned in casting), default=0)
+    return least >= _MANY and any(p.points >= _MANY_DIRECTIONS for p in casting if isinstance(p.light, DomeLight))
 
 
 def count_maps(planned: PlannedLight) -> int:

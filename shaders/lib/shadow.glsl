@@ -162,6 +162,12 @@ float visibility(Light light, vec3 position) {
     vec2 row = mix(lit.wx, lit.zy, t.x);
     return mix(row.x, row.y, t.y);
 }
+#elif defined(SHARED_SHADOWS)
+#include "lib/shared_seen.glsl"
+
+float visibility(Light light, vec3 position) {
+    return shared_visibility(light.first_shadow_map);
+}
 #else
 float visibility(Light light, vec3 position) {
     return 1.0;

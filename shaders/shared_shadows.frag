@@ -1,0 +1,15 @@
+#include "lib/surface.glsl"
+#include "lib/light.glsl"
+#include "lib/shadow.glsl"
+#include "lib/shared_shadows.glsl"
+#include "generated/planes.glsl"
+#include "generated/shared_maps.glsl"
+
+out uvec2 seen;                    // four bits for each of some directions: the share of their light that reaches a pixel
+
+// A pixel for each of one class, side by side.
+void main() {
+    ivec2 pixel = min(pixel_of_cell(ivec2(gl_FragCoord.xy)), ivec2(view.size) - 1);
+    float stored = texelFetch(plane_depth, pixel, 0).x;
+    seen = look_up_shared(position_at(vec2(pixel) + 0.5, camera_depth(stored)));
+}
