@@ -58,6 +58,8 @@ def _of_lights(plan: Plan) -> Iterator[Decision]:
 
 def _of_shadows(plan: Plan) -> Iterator[Decision]:
     yield _explain_maps(plan)
+    if plan.sharing_pixels > 1:
+        yield Decision("a dome's shadows", "shared", f"by {plan.sharing_pixels} pixels, each of which looks up some")
     if plan.shadows:
         yield _explain_backs(plan)
     yield _kept("IES profiles", bool(plan.profiles), "a light is shaped by one", "no light has one")
