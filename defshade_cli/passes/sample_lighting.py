@@ -123,6 +123,7 @@ class SampleLighting:
         openness = self._visibility_pass(lit.variant) if visibility else None
         if openness and visibility:
             openness.begin_sample(visibility)
+        self._shared.begin_sample(sample.index)
         batches = light_batches(lit.scene, plan, sample, canvas.guides) if plan.lit else ()
         for number, batch in enumerate(batches):
             shadows = self._shadows(lit, sample, batch, number, canvas.known) if plan.shadows else None

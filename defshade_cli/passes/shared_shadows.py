@@ -56,7 +56,10 @@ class SharedShadows:
         self._context, self._frame, self._screen = gpu.context, frame, Screen(gpu)
         self._records = RecordBuffer(gpu, SHADOW_BLOCK, uniform=True)
         self._array = cache(lambda variant, classes: self._screen.array(_compile(gpu, variant, classes)))
-        self._number = 0
+
+    def begin_sample(self, index: int) -> None:
+        """The class that looks up a sample's first run is told by its index, and by nothing that was drawn before."""
+        self._number = index
 
     def see(self, variant: LightingVariant, plan: Plan, gbuffer: GBuffer, maps: ShadowAtlas) -> SharedRun:
         """What the next class of pixels sees of at most SHARED_DIRECTIONS lights, each of which has a single map."""
