@@ -57,6 +57,25 @@ def test_a_primvar_that_varies_over_a_prim_feeds_no_number_and_is_named() -> Non
     assert reasons(scene, "/cube") == ["primvars:rust is left out: only colours may vary over a prim"]
 
 
+@pytest.mark.parametrize(
+    ("primvar", "told"),
+    [
+        ("float[] primvars:rust = []", []),
+        (
+            'float[] primvars:rust = [0.5, 0.25] (interpolation = "constant")\nint[] primvars:rust:indices = [2]',
+            ["primvars:rust is left out: its indices are out of range"],
+        ),
+        ("float primvars:rust = nan", ["without metallic (not finite)"]),
+    ],
+)
+def test_a_primvar_without_a_sound_value_leaves_the_readers_fallback(primvar: str, told: list[str]) -> None:
+    reader = READER.format(type="float", name="rust", fallback="float inputs:fallback = 0.75")
+    material = surface("m", "float inputs:metallic.connect = </m/reader.outputs:result>", reader)
+    scene = read(material + "def " + RUSTY % ("a", primvar))
+    assert [found.metallic for found in scene.materials] == [0.75]
+    assert [issue.reason for issue in scene.unsupported] == told
+
+
 TRIANGLE = """int[] faceVertexCounts = [3]
 int[] faceVertexIndices = [0, 1, 2]
 point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0)]

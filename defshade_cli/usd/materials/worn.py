@@ -16,7 +16,7 @@ from defshade_cli.scene.geometry import Mesh
 from defshade_cli.scene.material import Material
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.materials.material import as_field, sound
-from defshade_cli.usd.polygons.primvars import authored, find_display
+from defshade_cli.usd.polygons.primvars import OUT_OF_RANGE, authored, find_display, followed
 
 _DEFAULTS = {f.name: f.default for f in fields(Material)}
 
@@ -67,15 +67,15 @@ def _single(prim: Usd.Prim, name: str, time: Usd.TimeCode, issues: list[str]) ->
     if source is None or source.value is None:
         issues.extend(_of_copies(prim, name))
         return None
-    rows = np.asarray(source.value)
-    if not primvar.GetTypeName().isArray:
-        rows = rows[None]
-    elif source.indices is not None:
-        rows = rows[np.asarray(source.indices)]
-    if not len(rows) or (rows != rows[0]).any():
+    values = np.asarray(source.value)
+    rows = followed(values, source.indices) if primvar.GetTypeName().isArray else values[None]
+    if rows is None:
+        issues.append(f"{source.name} is left out: {OUT_OF_RANGE}")
+        return None
+    if len(rows) > 1 and (rows != rows[0]).any():
         issues.append(f"{source.name} is left out: only colours may vary over a prim")
         return None
-    return tuple(np.ravel(rows[0]).tolist())
+    return tuple(np.ravel(rows[0]).tolist()) if len(rows) else None
 
 
 def _of_copies(prim: Usd.Prim, name: str) -> Iterator[str]:

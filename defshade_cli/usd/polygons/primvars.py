@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,9 @@ class Authored:
     value: object
     interpolation: str
     indices: object | None = None
+
+
+OUT_OF_RANGE = "its indices are out of range"
 
 
 class Carried(NamedTuple):
@@ -149,12 +152,18 @@ def _resolved(source: Authored, width: int) -> NDArray[np.float32] | str:
     values = floats(source.value, width)
     if values is None:
         return f"its type is not {width} floats a value"
-    if source.indices is None:
+    at_indices = followed(values, source.indices)
+    return OUT_OF_RANGE if at_indices is None else at_indices
+
+
+def followed(values: NDArray[Any], indices: object | None) -> NDArray[Any] | None:
+    """The values (N, ...) at indices, or as they are without any; None where indices are out of range."""
+    if indices is None:
         return values
-    indices = integers(source.indices)
-    if indices is None or (len(indices) and not 0 <= indices.min() <= indices.max() < len(values)):
-        return "its indices are out of range"
-    return values[indices]
+    found = integers(indices)
+    if found is None or (len(found) and not 0 <= found.min() <= found.max() < len(values)):
+        return None
+    return values[found]
 
 
 def read_shown(
