@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from build import quad, scene, sphere, sun
 from defshade_cli import render
 from defshade_cli.passes.shared_shadows import apart_from, shared_runs, sharing_source
-from defshade_cli.plan import make_plan, sharing
+from defshade_cli.plan import make_plan, shared_shadows
 from defshade_cli.plan.plan import Plan
 from defshade_cli.scene.light import DomeLight
 from defshade_cli.settings import RenderSettings
@@ -35,7 +35,7 @@ def pictures(
     """The beauty by shared look-ups, and by each pixel's own."""
     found = []
     for worthwhile in (0, 10**9):
-        monkeypatch.setattr(sharing, "_WORTHWHILE", worthwhile)
+        monkeypatch.setattr(shared_shadows, "_WORTHWHILE", worthwhile)
         found.append(render(ACCURACY / f"{name}.usda", size=(240, 135), **options).layers["beauty"][..., :3])  # type: ignore[arg-type]
     return found[0], found[1]
 
@@ -65,13 +65,13 @@ def DomeLight "Sky" {}
 """)
     found = []
     for worthwhile in (0, 10**9):
-        monkeypatch.setattr(sharing, "_WORTHWHILE", worthwhile)
+        monkeypatch.setattr(shared_shadows, "_WORTHWHILE", worthwhile)
         found.append(render(stage, size=(64, 36)).layers["beauty"])
     np.testing.assert_allclose(*found, rtol=2e-5, atol=1e-6)
 
 
 def test_layers_of_the_light_are_sums_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sharing, "_WORTHWHILE", 0)
+    monkeypatch.setattr(shared_shadows, "_WORTHWHILE", 0)
     names = ("beauty", "diffuse", "specular")
     layers = render(ACCURACY / "dome_even.usda", size=(64, 36), layers=names).layers
     covered = layers["diffuse"][..., :3].sum(axis=-1) > 0.0

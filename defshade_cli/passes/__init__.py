@@ -13,7 +13,7 @@ A sample:
     emitters, shadow…, shadows       what stands for each light in it, and the maps seen from there
     emission, lighting, volumes      what shines by itself; each light as its volume
     light_tiles, light_lists, hidden_lights   many lights, by tiles of the image
-    light_whole                      lights that reach all of it
+    light_whole, shared_shadows      lights that reach all of it; a dome's shadows, looked up by pixels for each other
     environment, dome…, sky…         skies, and how much of them is open
     lobes, lobe_rays, lamp_records   what lobes mirror, by rays of each pixel's own
     light_records, light_traits, light_targets, linking, tables   what the shaders read of lights, and draw them into

@@ -27,7 +27,7 @@ from defshade_cli.passes.shared_shadows import SharedRun, sharing_source
 from defshade_cli.passes.tables import NO_TABLES, LightTables
 from defshade_cli.plan import Plan, PlannedLight
 from defshade_cli.plan.cost import LIGHTS_A_DRAW
-from defshade_cli.plan.sharing import SHARED_DIRECTIONS
+from defshade_cli.plan.shared_shadows import SHARED_DIRECTIONS
 
 
 class WholeLighting:

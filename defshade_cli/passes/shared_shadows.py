@@ -24,10 +24,10 @@ from defshade_cli.gpu.shaders import set_uniforms
 from defshade_cli.passes.frame import Frame
 from defshade_cli.passes.gbuffer import GBuffer
 from defshade_cli.passes.lighting import LightingVariant
-from defshade_cli.passes.screen import WHOLE, Screen
+from defshade_cli.passes.screen import Screen
 from defshade_cli.passes.shadow_atlas import ShadowAtlas, shadow_source
 from defshade_cli.plan import Plan, PlannedLight
-from defshade_cli.plan.sharing import SHARED_DIRECTIONS, may_share
+from defshade_cli.plan.shared_shadows import SHARED_DIRECTIONS, may_share
 
 _STEPS = 4
 """Neighbours of each class that a pixel chooses among."""
@@ -72,7 +72,6 @@ class SharedShadows:
         self._records.write(np.roll(maps.records, -int(maps.first_record[0])))
         set_uniforms(array.program, {"shared_class": self._number})
         gbuffer.bind(array.program, shadow_atlas=maps.depth)
-        self._screen.cover(WHOLE)
         self._screen.draw(array)
         return SharedRun(self._number, target.textures["shared"])
 

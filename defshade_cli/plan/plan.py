@@ -15,7 +15,7 @@ from defshade_cli.plan.light_plan import LightPlan
 from defshade_cli.plan.moments import share_moments
 from defshade_cli.plan.planes import is_lit, primvar_names
 from defshade_cli.plan.redrawing import WHOLE, Redrawing
-from defshade_cli.plan.sharing import sharing_pixels
+from defshade_cli.plan.shared_shadows import sharing_pixels
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.texture import Texture
 from defshade_cli.scene.window import DataWindow
