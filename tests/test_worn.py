@@ -98,6 +98,14 @@ def test_a_prim_without_coordinates_is_read_at_the_readers_fallback(tmp_path: Pa
         np.testing.assert_allclose(read_at.texture_from_uv, [[0, 0, 4 - 0.25 * 3], [0, 0, 5 + 0.5 * 2]], atol=1e-12)
 
 
+@pytest.mark.parametrize("fallback", ["float inputs:fallback = 0.5", "float2 inputs:fallback = (nan, 0)"])
+def test_a_fallback_that_is_no_coordinates_counts_as_none(tmp_path: Path, fallback: str) -> None:
+    (tmp_path / "wood.png").touch()
+    stage = Path(network(tmp_path, "wood.png"))
+    stage.write_text(stage.read_text().replace("string inputs:varname", f"{fallback}\nstring inputs:varname"))
+    assert read_inputs(str(stage))["diffuse_color"].fallback == (0.0, 0.0)
+
+
 @pytest.mark.parametrize(
     ("body", "left_out"),
     [

@@ -23,6 +23,7 @@ from defshade_cli.scene.texture import (
 )
 from defshade_cli.usd.color_space import texture_space
 from defshade_cli.usd.materials.network import Network, computed, node_of
+from defshade_cli.usd.values import is_finite, resembles
 
 _READERS = ("UsdPrimvarReader_float2", "UsdPrimvarReader_float3", "UsdPrimvarReader_float4")
 _MOST_TRANSFORMS = 64
@@ -87,14 +88,22 @@ def _coordinates(network: Network, source: Usd.Attribute | None, left: int = _MO
         return _Coordinates("", ((0.0, 0.0, u), (0.0, 0.0, v)))
     node, identifier = node_of(source)
     if identifier in _READERS:
-        u, v, *_ = np.ravel(network.value(node, "fallback", (0, 0))).tolist()
-        return _Coordinates(str(network.value(node, "varname", "")), IDENTITY, (u, v))
+        return _Coordinates(str(network.value(node, "varname", "")), IDENTITY, _fallback(network, node))
     if identifier != "UsdTransform2d":
         raise Unreadable(f"texture coordinates of {identifier}")
     if not left:
         raise Unreadable("texture coordinates that run in a circle")
     below = _coordinates(network, network.source(node, "in"), left - 1)
     return below._replace(texture_from_uv=_product(_transform(network, node), below.texture_from_uv))
+
+
+def _fallback(network: Network, node: UsdShade.Shader) -> tuple[float, float]:
+    """Of a reader; the schema's own in the place of what is not finite, or no coordinates at all."""
+    found = np.ravel(network.value(node, "fallback", (0.0, 0.0)))[:2]
+    if not resembles(found, (0.0, 0.0)) or not is_finite(found):
+        return 0.0, 0.0
+    u, v = found.tolist()
+    return u, v
 
 
 def _transform(network: Network, node: UsdShade.Shader) -> Affine:
