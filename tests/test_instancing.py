@@ -127,6 +127,38 @@ def test_collections_bind_what_is_inside_instances(members: str) -> None:
     assert len(shared.meshes) == 2
 
 
+def test_collections_of_a_prototype_leave_each_instance_its_own_material() -> None:
+    """What no collection of the prototype holds, is bound as the outer instances are."""
+    row = f"""class Xform "lot" {{
+        def Xform "row" (prepend apiSchemas = ["MaterialBindingAPI", "CollectionAPI:some"]) {{
+            rel collection:some:includes = [</lot/row/inner/crown>]
+            rel material:binding:collection:some = [</lot/row.collection:some>, </metal>]
+            {instance("inner")}
+        }}
+    }}
+    def Material "metal" {{
+    }}
+    """
+    lots = bound(instance("a", source="lot"), "wood") + bound(instance("b", source="lot"), "paint")
+    scene = read(MATERIALS + TREE + row + lots)
+    for lot, name in (("a", "/wood"), ("b", "/paint")):
+        assert material_names(scene, f"/{lot}/row/inner/trunk") == [name]
+        assert material_names(scene, f"/{lot}/row/inner/crown/leaves") == ["/metal"]
+
+
+def test_collections_bind_what_is_inside_later_instances() -> None:
+    """The instance that comes first has all that the second has, but for the collection above it."""
+    text = f"""{MATERIALS}{TREE}{instance("a")}
+    def Xform "wood_lot" (prepend apiSchemas = ["MaterialBindingAPI", "CollectionAPI:some"]) {{
+        rel collection:some:includes = [</wood_lot/b/trunk>]
+        rel material:binding:collection:some = [</wood_lot.collection:some>, </paint>]
+        {instance("b")}
+    }}"""
+    scene = read(text)
+    assert material_names(scene, "/a/trunk") == ["<unbound>"]
+    assert material_names(scene, "/wood_lot/b/trunk") == ["/paint"]
+
+
 @pytest.mark.parametrize("purposes", [("default",), ("default", "render"), ("default", "proxy"), ("guide",)])
 def test_purposes_are_handed_down_as_usd_computes_them(purposes: tuple[str, ...]) -> None:
     text = TREE.replace('def Xform "crown" {', 'def Xform "crown" {\nuniform token purpose = "proxy"')

@@ -1,4 +1,4 @@
-"""The types of option values: each turns text that a user typed into a value, or says what is wrong.."""
+"""The types of option values: each turns text that a user typed into a value, or says what is wrong."""
 
 from __future__ import annotations
 

@@ -18,6 +18,12 @@ class Names:
         root, slash, below = str(path)[1:].partition("/")
         return self._first_instances.get(root, f"/{root}") + slash + below
 
+    def on_stage(self, shown: str, beside: Sdf.Path) -> str:
+        """Where the stage has what is shown at a path; `beside` is in the same prototype, or as it in none."""
+        root = str(beside)[1:].partition("/")[0]
+        first = self._first_instances.get(root)
+        return f"/{root}{shown[len(first) :]}" if first and shown.startswith(f"{first}/") else shown
+
     def name_prototype(self, prototype: Usd.Prim, instance: Usd.Prim) -> str:
         """Show what stands in `prototype` as part of `instance`, or of the instance that came first."""
         return self._first_instances.setdefault(prototype.GetName(), self.shown(instance.GetPath()))

@@ -159,8 +159,9 @@ class Traversal:
                 children = first.prim.GetPrototype().GetChildren()
                 self._prototypes[key] = self._read(children, first.here.inside(first.prim))
             placed = self._placed(self._prototypes[key] or (), placement)
-            held = self._memory.materials.binds_by_collection(first.prim.GetPath())
-            yield from chain.from_iterable(rebound(piece, self._memory) for piece in placed) if held else placed
+            if sharing.by_collection:
+                placed = chain.from_iterable(rebound(piece, self._memory, first.prim) for piece in placed)
+            yield from placed
         for prim, reasons in instances.issues.items():
             self.found.report(prim, *reasons)
 

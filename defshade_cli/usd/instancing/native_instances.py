@@ -27,11 +27,15 @@ from defshade_cli.usd.xform import matrices
 
 
 class Sharing(NamedTuple):
-    """What instances have in common that are placed together. animation: that their skeletons inherit."""
+    """What instances have in common that are placed together.
+
+    animation: that their skeletons inherit.  by_collection: may collections bind what is inside them?
+    """
 
     prototype: Sdf.Path
     animation: Sdf.Path | None
     bindings: Bindings
+    by_collection: bool
     in_world: bool
     purpose: str | None
 
@@ -60,9 +64,8 @@ class NativeInstances:
         """Note an instance, with those that share its prototype and all that it inherits."""
         prototype = prim.GetPrototype().GetPath()
         animation = self._memory.rigs.animation_of(here.on_stage(prim))
-        sharing = Sharing(
-            prototype, animation, self._memory.materials.bindings(prim.GetPath()), here.in_world, here.purpose
-        )
+        bindings, by_collection, _ = self._memory.materials.bound(prim.GetPath())
+        sharing = Sharing(prototype, animation, bindings, by_collection, here.in_world, here.purpose)
         self._shared[sharing].append(Instance(prim, here, self._met[prototype]))
         self._met[prototype] += 1
 
@@ -100,17 +103,19 @@ class NativeInstances:
         )
 
 
-def rebound(piece: Piece, memory: Memory) -> Iterator[Piece]:
-    """A piece of some instances in parts, bound as USD resolves it on the stage: collections may hold what is in one.
+def rebound(piece: Piece, memory: Memory, instance: Usd.Prim) -> Iterator[Piece]:
+    """A piece of some instances in parts, bound as USD resolves it where they are: collections may hold what is in one.
 
-    piece: placed on the stage; its bindings are by the paths of groups in the prototype.
+    piece: as placed; its bindings are by the paths of groups in the prototype.
+    instance: one of them. Where it is itself in a prototype, what is bound outside is laid under later.
     """
     surface = piece.content
     if not isinstance(surface, Surface) or any("." in group for group in piece.bindings):  # stand-ins bind themselves
         yield piece
         return
     below = [memory.names.shown(group)[len(surface.path) :] for group in piece.bindings]
-    found = [tuple(memory.materials.bindings(path + end) for end in below) for path in piece.paths]
+    paths = [memory.names.on_stage(path, instance.GetPath()) for path in piece.paths]
+    found = [tuple(memory.materials.bindings(path + end) for end in below) for path in paths]
     for bindings in dict.fromkeys(found):
         part = piece if len(found) == 1 else some(piece, np.array([each == bindings for each in found]))
         yield replace(part, bindings=dict(zip(piece.bindings, bindings, strict=True)))

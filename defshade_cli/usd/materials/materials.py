@@ -47,9 +47,9 @@ class Materials:
         """Relationships do not vary over time."""
         return self._bound(str(path)).bindings
 
-    def binds_by_collection(self, path: Sdf.Path) -> bool:
-        """Does a prim, or one above it, bind what a collection holds?"""
-        return self._bound(str(path)).by_collection
+    def bound(self, path: Sdf.Path) -> Bound:
+        """The same, with whether a prim, or one above it, binds what a collection holds."""
+        return self._bound(str(path))
 
     def _bound(self, path: str, prim: Usd.Prim | None = None, said: Said | None = None) -> Bound:
         """From the nearest prim above whose bindings are known, downwards. prim, said: of the path, where known."""
