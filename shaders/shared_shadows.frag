@@ -7,9 +7,10 @@
 
 out uvec2 seen;                    // four bits for each of some directions: the share of their light that reaches a pixel
 
-// A pixel for each of one class, side by side.
+// A pixel for each of one class, side by side; none asks one that shows no surface.
 void main() {
     ivec2 pixel = min(pixel_of_cell(ivec2(gl_FragCoord.xy)), ivec2(view.size) - 1);
     float stored = texelFetch(plane_depth, pixel, 0).x;
+    if (stored == BACKGROUND_DEPTH) discard;
     seen = look_up_shared(position_at(vec2(pixel) + 0.5, camera_depth(stored)));
 }
