@@ -127,6 +127,13 @@ def test_nodes_that_the_document_defines_are_the_graphs_that_they_stand_for(tmp_
     np.testing.assert_allclose(scene.materials[0].diffuse_color, (0.1, 0.05, 0.1), rtol=1e-6)
 
 
+def test_a_node_that_is_defined_by_itself_is_named(tmp_path: Path) -> None:
+    pytest.importorskip("MaterialX")
+    circle = DEFINED.replace('<multiply name="product"', '<dimmed name="product"').replace("</multiply>", "</dimmed>")
+    scene = read_stage(with_document(tmp_path, circle))
+    assert ["dimmed" in issue.reason for issue in scene.unsupported] == [True]
+
+
 def test_the_files_on_disk_stay_as_they_are(tmp_path: Path) -> None:
     stage = with_document(tmp_path)
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}

@@ -87,6 +87,7 @@ class _Writer:
     def __init__(self, layer: Sdf.Layer, document: mx.Document, resolved: str, root: Sdf.Path) -> None:
         self._layer, self._document, self._resolved, self._root = layer, document, resolved, root
         self._written: set[Sdf.Path] = set()
+        self._expanding: list[str] = []
 
     def write(self, material: mx.Node) -> None:
         _define(self._layer, self._root, "Material")
@@ -101,7 +102,8 @@ class _Writer:
         if path in self._written:
             return path
         self._written.add(path)
-        if graph := _implementing(node):
+        graph = _implementing(node)
+        if graph and graph.getName() not in self._expanding:  # a graph inside itself has no end
             return self._expand(node, graph, path, parent)
         prim = _define(self._layer, path, "Shader")
         surface = node.getType() == _SURFACE
@@ -118,7 +120,10 @@ class _Writer:
         _define(self._layer, path, "NodeGraph")
         for found in (*node.getNodeDef().getActiveInputs(), *node.getInputs()):
             self._input(found, path, parent)
-        return self._with_outputs(graph, path)
+        self._expanding.append(graph.getName())
+        expanded = self._with_outputs(graph, path)
+        self._expanding.pop()
+        return expanded
 
     def _input(self, found: mx.Input, path: Sdf.Path, parent: Sdf.Path) -> None:
         attribute = _attribute(self._layer.GetPrimAtPath(path), f"inputs:{found.getName()}", found.getType())
