@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from defshade_cli.scene.material import UNBOUND
 from test_materialx import GLTF, PREVIEW, STANDARD, WOOD, node, read, scene_of, shaded
 
 RED = (0.5, 0.2, 0.1)
@@ -25,6 +26,7 @@ GRAY = float(np.dot(RED, (0.2722287, 0.6740818, 0.0536895)))
         ("ND_smoothstep_color3FA", f"color3f inputs:in = {RED}\nfloat inputs:high = 0.4", (1, 0.5, 0.15625)),
         ("ND_hsvtorgb_color3", "color3f inputs:in = (0.4, 0.7, 0.9)", colorsys.hsv_to_rgb(0.4, 0.7, 0.9)),
         ("ND_hsvtorgb_color3", "color3f inputs:in = (-0.1, 0.7, 0.9)", colorsys.hsv_to_rgb(0.9, 0.7, 0.9)),
+        ("ND_hsvtorgb_color3", "float inputs:in = 0.5", colorsys.hsv_to_rgb(0.5, 0.5, 0.5)),
         ("ND_rgbtohsv_color3", f"color3f inputs:in = {RED}", colorsys.rgb_to_hsv(*RED)),
         ("ND_rgbtohsv_color3", "color3f inputs:in = (0.2, 0.1, 0.5)", colorsys.rgb_to_hsv(0.2, 0.1, 0.5)),
         ("ND_rgbtohsv_color3", "color3f inputs:in = (0.2, 0.2, 0.2)", (0, 0, 0.2)),
@@ -111,3 +113,11 @@ def test_a_colour_from_a_primvar_has_the_nodes_default(tmp_path: Path) -> None:
     base = "color3f inputs:base_color.connect = </m/made.outputs:out>"
     found, _ = read(tmp_path, GLTF, base, node("made", "ND_geompropvalue_color3", inputs))
     assert (found.color_primvar, found.diffuse_color) == ("worn", (0.25, 0.5, 1))
+
+
+@pytest.mark.parametrize("default", ['string inputs:default = "much"', "float[] inputs:default = []"])
+def test_a_default_that_is_no_number_counts_as_none(tmp_path: Path, default: str) -> None:
+    made = node("made", "ND_geompropvalue_float", f'string inputs:geomprop = "worn"\n{default}', "float outputs:out")
+    fed = "\n".join(f"float inputs:{name}.connect = </m/made.outputs:out>" for name in ("roughness", "base_color"))
+    found, lost = read(tmp_path, GLTF, fed, made)
+    assert (found.roughness, found.diffuse_color, lost) == (1.0, UNBOUND.diffuse_color, [])

@@ -58,6 +58,12 @@ def integers(value: object) -> NDArray[np.integer] | None:
     return array if array.dtype.kind in "iu" and array.ndim == 1 else None
 
 
+def is_numbers(value: object) -> bool:
+    """Is `value` a number, or are there some in it and nothing else?"""
+    array = np.asarray(value)
+    return array.dtype.kind in "biuf" and array.size > 0
+
+
 def resembles(value: object, model: object) -> bool:
     """Is `value` of the kind that `model` is: as many numbers, or the same type?"""
     if isinstance(value, _LONE) and type(value) is type(model):

@@ -126,6 +126,11 @@ def _range(graph: Graph, node: UsdShade.Shader, _: str, width: int) -> Signal:
     return _remap(graph.signal(node, "in", 0.0), *(graph.signal(node, n, d) for n, d in names.items())).widened(width)
 
 
+def _of_color(function: Callable[[Values], Values]) -> Evaluate:
+    """The same of a colour, for which a single number may stand."""
+    return _arithmetic(lambda color: by_values(function, color.widened(3)), **{"in": _NO_COLOR})
+
+
 def _luminance(value: Values, coefficients: Values) -> Values:
     return np.full_like(value, np.dot(value[:3], coefficients[:3]))
 
@@ -200,8 +205,8 @@ NODES: dict[str, Evaluate] = {
     "luminance": _of_values(_luminance, **{"in": 0.0}, lumacoeffs=_LUMA),
     "saturate": _of_values(_saturated, **{"in": 0.0}, amount=1.0, lumacoeffs=_LUMA),
     "smoothstep": _of_values(_smooth, **{"in": 0.0}, low=0.0, high=1.0),
-    "hsvtorgb": _of_values(_from_hsv, **{"in": _NO_COLOR}),
-    "rgbtohsv": _of_values(_to_hsv, **{"in": _NO_COLOR}),
+    "hsvtorgb": _of_color(_from_hsv),
+    "rgbtohsv": _of_color(_to_hsv),
     "floor": _of_values(np.floor, **{"in": 0.0}),
     "ceil": _of_values(np.ceil, **{"in": 0.0}),
     "round": _of_values(np.round, **{"in": 0.0}),

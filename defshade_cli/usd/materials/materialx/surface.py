@@ -17,6 +17,7 @@ from defshade_cli.usd.materials.materialx.nodes import NODES
 from defshade_cli.usd.materials.materialx.signal import NonLinear, Signal, constant
 from defshade_cli.usd.materials.network import Network, computed, node_of
 from defshade_cli.usd.polygons.primvars import DISPLAY_COLOR
+from defshade_cli.usd.values import is_numbers
 
 _LETTERS = "rgba"
 
@@ -135,7 +136,7 @@ class Translation:
         node, identifier = node_of(source)
         read_as = ("varname", "fallback") if "UsdPrimvarReader" in identifier else ("geomprop", "default")
         varname, fallback = (self.network.value(node, attribute) for attribute in read_as)
-        return str(varname or ""), fallback
+        return str(varname or ""), fallback if is_numbers(fallback) else None
 
     def put_occlusion(self) -> None:
         """Put the occlusion that was found beside the surface, if any."""
