@@ -113,6 +113,7 @@ def test_a_fallback_that_is_no_coordinates_counts_as_none(tmp_path: Path, fallba
         ("float inputs:displacement = 0.5", ["without displacement (the same everywhere)"]),
         ("normal3f inputs:normal = (1, 0, 0)", ["without normal (the same everywhere)"]),
         ("float inputs:metallic.connect = </m/gone.outputs:r>", ["without metallic (connected to nothing)"]),
+        ("float inputs:occlusion.connect = </m/gone.outputs:r>", []),
     ],
 )
 def test_what_a_surface_says_in_vain_is_named(body: str, left_out: list[str]) -> None:

@@ -137,10 +137,12 @@ def _read_inputs(shader: UsdShade.Shader, network: Network, skipped: tuple[str, 
     inputs = _Inputs(network)
     for authored in shader.GetInputs():
         name = authored.GetBaseName()
+        if name in skipped:
+            continue
         source = network.source(shader, name)
-        if source is None and _is_adrift(authored.GetAttr()):
-            inputs.left_out.append(f"{name} (connected to nothing)")
-        if source is None or name in skipped:
+        if source is None:
+            if _is_adrift(authored.GetAttr()):
+                inputs.left_out.append(f"{name} (connected to nothing)")
             continue
         if computed(source):
             _take_from_node(inputs, name, source)
