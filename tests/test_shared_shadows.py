@@ -51,22 +51,31 @@ def test_pictures_differ_where_shadows_end_alone(name: str, samples: int, monkey
     assert same.mean() > 0.9
 
 
-def test_without_a_shadow_nothing_differs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+def test_without_a_shadow_nothing_differs(projection: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """What reaches a pixel as a whole is 15 of 15 parts; floats are added in another order, 128 of 6e-8."""
     stage = tmp_path / "floor.usda"
-    stage.write_text("""#usda 1.0
-def Mesh "Floor" {
+    stage.write_text(f"""#usda 1.0
+def Camera "Camera" {{
+    token projection = "{projection}"
+    float2 clippingRange = (1, 100)
+    double3 xformOp:translate = (0, 5, 0)
+    float3 xformOp:rotateXYZ = (-75, 0, 0)
+    uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:rotateXYZ"]
+}}
+def Mesh "Floor" {{
     int[] faceVertexCounts = [4]
     int[] faceVertexIndices = [0, 1, 2, 3]
     point3f[] points = [(-9, 0, -9), (-9, 0, 9), (9, 0, 9), (9, 0, -9)]
     uniform token subdivisionScheme = "none"
-}
-def DomeLight "Sky" {}
+}}
+def DomeLight "Sky" {{}}
 """)
     found = []
     for worthwhile in (0, 10**9):
         monkeypatch.setattr(shared_shadows, "_WORTHWHILE", worthwhile)
         found.append(render(stage, size=(64, 36)).layers["beauty"])
+    assert found[0][..., 3].mean() > 0.5
     np.testing.assert_allclose(*found, rtol=2e-5, atol=1e-6)
 
 
