@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache
+from itertools import count
 from typing import Any
 
 from numpy.typing import NDArray
@@ -123,7 +124,7 @@ class SampleLighting:
         openness = self._visibility_pass(lit.variant) if visibility else None
         if openness and visibility:
             openness.begin_sample(visibility)
-        self._shared.begin_sample(sample.index)
+        turns = count(sample.index + 1)
         batches = light_batches(lit.scene, plan, sample, canvas.guides) if plan.lit else ()
         for number, batch in enumerate(batches):
             shadows = self._shadows(lit, sample, batch, number, canvas.known) if plan.shadows else None
@@ -133,11 +134,12 @@ class SampleLighting:
             own = apart_from(len(lights), runs)
             self._add_apart(lit, [lights[n] for n in own], records[own], canvas, shadows and shadows.part(own))
             if openness and visibility and shadows:
-                self._records.write(records)
+                if runs:
+                    self._records.write(records)
                 openness.add(lights, plan, canvas.gbuffer, visibility, shadows)
             for run in runs:
                 assert shadows
-                self._add_shared(lit, lights[run], records[run], canvas, shadows.part(run))
+                self._add_shared(lit, lights[run], records[run], canvas, shadows.part(run), next(turns))
 
     def _shadows(
         self, lit: LitScene, sample: Sample, batch: Sequence[LitSample], number: int, known: Known
@@ -176,9 +178,10 @@ class SampleLighting:
         records: NDArray[Any],
         canvas: Canvas,
         shadows: ShadowAtlas,
+        turn: int,
     ) -> None:
-        """Directions of a dome whose shadows pixels tell each other."""
-        seen = self._shared.see(lit.variant, lit.plan, canvas.gbuffer, shadows)
+        """Directions of a dome whose shadows pixels tell each other. turn: of the pixels that look them up."""
+        seen = self._shared.see(lit.variant, lit.plan, canvas.gbuffer, shadows, turn)
         self._whole.add(lights, records, lit.plan, canvas.gbuffer, canvas.targets, None, lit.tables, seen)
 
     def _add_skies(self, lit: LitScene, canvas: Canvas) -> None:

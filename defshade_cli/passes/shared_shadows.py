@@ -57,23 +57,22 @@ class SharedShadows:
         self._records = RecordBuffer(gpu, SHADOW_BLOCK, uniform=True)
         self._array = cache(lambda variant, classes: self._screen.array(_compile(gpu, variant, classes)))
 
-    def begin_sample(self, index: int) -> None:
-        """The class that looks up a sample's first run is told by its index, and by nothing that was drawn before."""
-        self._number = index
+    def see(self, variant: LightingVariant, plan: Plan, gbuffer: GBuffer, maps: ShadowAtlas, turn: int) -> SharedRun:
+        """What a class of pixels sees of at most SHARED_DIRECTIONS lights, each of which has a single map.
 
-    def see(self, variant: LightingVariant, plan: Plan, gbuffer: GBuffer, maps: ShadowAtlas) -> SharedRun:
-        """What the next class of pixels sees of at most SHARED_DIRECTIONS lights, each of which has a single map."""
+        turn: of the classes, one after another.
+        """
         classes = plan.sharing_pixels
-        array, self._number = self._array(variant, classes), (self._number + 1) % classes
+        array, number = self._array(variant, classes), turn % classes
         width, height = plan.size
         target = self._frame.of_tiles("shared", 2, (-(-width // classes), height), "u4")
         target.framebuffer.use()
         self._context.enable_only(moderngl.NOTHING)
         self._records.write(np.roll(maps.records, -int(maps.first_record[0])))
-        set_uniforms(array.program, {"shared_class": self._number})
+        set_uniforms(array.program, {"shared_class": number})
         gbuffer.bind(array.program, shadow_atlas=maps.depth)
         self._screen.draw(array)
-        return SharedRun(self._number, target.textures["shared"])
+        return SharedRun(number, target.textures["shared"])
 
 
 def shared_runs(lights: Sequence[PlannedLight], plan: Plan) -> list[slice]:
