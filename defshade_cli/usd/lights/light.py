@@ -163,7 +163,8 @@ def _left_out(prim: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
 def _of_old(prim: Usd.Prim) -> list[str]:
     """Inputs under the names that they had before version 21.02, and under no others."""
     names, known = prim.GetAuthoredPropertyNames(), set(prim.GetPrimDefinition().GetPropertyNames())
-    return [name for name in names if name not in known and _INPUTS + name in known.difference(names)]
+    unsaid = known.difference(names)
+    return [name for name in names if name not in known and _INPUTS + name in unsaid]
 
 
 def _input(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> Any:

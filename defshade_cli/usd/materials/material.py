@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pxr import Sdf, Usd, UsdShade
@@ -25,6 +25,9 @@ from defshade_cli.usd.materials.network import Network, computed, node_of
 from defshade_cli.usd.materials.texture import Unreadable, read_texture_input
 from defshade_cli.usd.polygons.primvars import DISPLAY_COLOR
 from defshade_cli.usd.values import is_finite
+
+if TYPE_CHECKING:
+    from defshade_cli.usd.materials.materialx.surface import Translation
 
 _NEUTRAL: dict[str, Any] = {"displacement": 0.0, "normal": (0.0, 0.0, 1.0)}
 """Constants that change nothing, of inputs of which no other constant is drawn."""
@@ -76,25 +79,19 @@ def read_material(
         return not_understood(shown_as, "the bound material does not exist")
     network = Network(time)
     shader, identifier = _surface_of(prim)
+    read: _Inputs | Translation
     if identifier == _PREVIEW_SURFACE:
-        inputs = _read_inputs(shader, network, () if occlusion else _WITHOUT_EFFECT)
-        material = Material(
-            shown_as, **sound(inputs.values, inputs.left_out), primvars=inputs.primvars, inputs=inputs.textures
-        )
+        read = inputs = _read_inputs(shader, network, () if occlusion else _WITHOUT_EFFECT)
         reason, left_out = "without", inputs.left_out
     elif _is_understood(identifier):
         from defshade_cli.usd.materials.materialx.models import translate
 
-        translation = translate(shader, identifier, network, occlusion=occlusion)
+        read = translation = translate(shader, identifier, network, occlusion=occlusion)
         reason, left_out = f"lost of {identifier}:", list(translation.lost)
-        material = Material(
-            shown_as,
-            **sound(translation.values, left_out),
-            primvars=translation.primvars,
-            inputs=translation.textures,
-        )
     else:
         return not_understood(shown_as, _surface_named(prim, shader, identifier))
+    values = sound(read.values, left_out)
+    material = Material(shown_as, **values, primvars=read.primvars, inputs=read.textures)
     left_out.extend(f"textures at primvar {name}" for name in material.uv_names[UV_SETS:])
     issues = (Unsupported(shown_as, f"{reason} {', '.join(left_out)}"),) if left_out else ()
     return ReadMaterial(material, time_varying=network.time_varying, issues=issues)
