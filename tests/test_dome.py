@@ -8,6 +8,7 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 from numpy.typing import NDArray
+from pxr import Usd, UsdUtils
 
 from build import camera, quad, rotated, scene, sphere
 from defshade_cli.gpu.context import Gpu
@@ -133,6 +134,18 @@ def test_domes_are_read_with_their_image_and_pole(tmp_path: Path) -> None:
     np.testing.assert_allclose(lights["/New"].world_from_light @ [0, 1, 0, 0], [0, 0, 1, 0])
     np.testing.assert_allclose(lights["/New"].world_from_light @ [0, 0, 1, 0], [0, -1, 0, 0])
     assert any("nowhere.exr is not found" in issue.reason for issue in read.unsupported)
+
+
+def test_a_sky_inside_a_package_is_the_sky_of_its_folder(tmp_path: Path) -> None:
+    """As usdz packagers leave it: the image lies in the package under a path from its layer."""
+    image = oiio.ImageBuf(np.full((4, 8, 3), 0.25, np.float32))
+    assert image.write(str(tmp_path / "sky.exr"), "float")
+    text = 'def Cube "Cube" {}\ndef DomeLight "Sky" { asset inputs:texture:file = @./sky.exr@ }'
+    (tmp_path / "stage.usda").write_text(f"#usda 1.0\n{text.replace(' }', chr(10) + '}')}\n")
+    assert UsdUtils.CreateNewUsdzPackage(str(tmp_path / "stage.usda"), str(tmp_path / "stage.usdz"))
+    (tmp_path / "sky.exr").unlink()
+    (sky,) = StageReader(Usd.Stage.Open(str(tmp_path / "stage.usdz"))).read(None).lights
+    assert isinstance(sky, DomeLight) and np.all(sky_of(sky).radiance == 0.25)
 
 
 def test_samples_hide_the_sky_from_a_mirror(pipeline: Pipeline) -> None:

@@ -13,6 +13,7 @@ from defshade_cli.passes.sampling import owen_sobol
 from defshade_cli.scene.distribution import GridDistribution
 from defshade_cli.scene.environment import Environment, harmonics, uniform_environment
 from defshade_cli.scene.light import DomeLight
+from defshade_cli.scene.texture import ImageFile
 
 
 def gradient_sky(height: int = 64) -> Environment:
@@ -117,7 +118,7 @@ def test_an_image_that_cannot_be_read_is_an_even_sky_and_said_once(
     """In one line, whatever the library says."""
     file = tmp_path / "sky.png"
     file.write_bytes(b"\x89PNG\r\n\x1a\n but no more")
-    dome = DomeLight(path="/sky", world_from_light=np.eye(4), color=np.ones(3), texture=str(file))
+    dome = DomeLight(path="/sky", world_from_light=np.eye(4), color=np.ones(3), texture=ImageFile(str(file)))
     with caplog.at_level(logging.WARNING):
         assert sky_of(dome) is sky_of(dome)
     (told,) = caplog.messages

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import logging
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from defshade_cli.errors import OutputError
+from defshade_cli.image.packed import on_disk, stamp
 from defshade_cli.image.projections import latlong_from
 from defshade_cli.image.transfer import linear
 from defshade_cli.scene.environment import Environment, SkyLayout, uniform_environment
 from defshade_cli.scene.light import DomeLight
+from defshade_cli.scene.texture import ImageFile
 
 log = logging.getLogger("defshade")
 
@@ -29,43 +29,41 @@ def sky_of(light: DomeLight) -> Environment:
         return light.environment
     if not light.texture:
         return _EVEN
-    path = Path(light.texture)
-    return _sky_in(path, light.layout, path.stat().st_mtime_ns if path.exists() else 0, light.path)
+    return _sky_in(light.texture, light.layout, stamp(light.texture), light.path)
 
 
 @lru_cache(maxsize=8)
-def _sky_in(path: Path, layout: SkyLayout, _changed: int, light: str) -> Environment:
+def _sky_in(file: ImageFile, layout: SkyLayout, version: int, light: str) -> Environment:
     """What the image of a light shows, which is said once where it cannot be read."""
     try:
-        return read_environment(path, layout)
-    except OutputError as error:
-        log.warning("%s: %s; its sky is even", light, " ".join(str(error).split()))
+        return _read(file, layout, version)
+    except OSError as error:
+        log.warning("%s: %s cannot be read: %s; its sky is even", light, file.path, " ".join(str(error).split()))
         return _EVEN
 
 
-def read_environment(path: Path, layout: SkyLayout = "automatic") -> Environment:
+@lru_cache(maxsize=8)
+def _read(file: ImageFile, layout: SkyLayout, _version: int) -> Environment:
     """The sky in an image, scene-linear Rec. 709; 8-bit images count as sRGB.
 
-    Read once as long as the file does not change. Raises OutputError where the file cannot be read.
+    Read once as long as the file does not change. Raises OSError where it cannot be read.
     """
-    try:
-        return _read(str(path), layout, path.stat().st_mtime_ns)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be read: {error.strerror}") from error
+    with on_disk(file) as path:
+        pixels, is_display_referred = _pixels(path)
+    pixels = np.where(np.isfinite(pixels), np.maximum(pixels, 0.0), 0.0)
+    return Environment(latlong_from(linear(pixels) if is_display_referred else pixels, layout))
 
 
-@lru_cache(maxsize=8)
-def _read(path: str, layout: SkyLayout, _changed: int) -> Environment:
+def _pixels(path: str) -> tuple[NDArray[np.float32], bool]:
+    """(H, W, 3) no wider than _WIDEST, and whether they are for displays. Raises OSError."""
     image = oiio.ImageBuf(path)
     if image.has_error or not image.spec().nchannels:
-        raise OutputError(f"{path} cannot be read: {image.geterror()}")
+        raise OSError(image.geterror())
     is_display_referred = image.spec().format.basetype == oiio.UINT8
     if image.spec().width > _WIDEST:
         height = max(1, round(image.spec().height * _WIDEST / image.spec().width))
         image = oiio.ImageBufAlgo.resize(image, filtername="box", roi=oiio.ROI(0, _WIDEST, 0, height))
-    pixels = _rgb(np.asarray(image.get_pixels(oiio.FLOAT)))
-    pixels = np.where(np.isfinite(pixels), np.maximum(pixels, 0.0), 0.0)
-    return Environment(latlong_from(linear(pixels) if is_display_referred else pixels, layout))
+    return _rgb(np.asarray(image.get_pixels(oiio.FLOAT))), is_display_referred
 
 
 def _rgb(pixels: NDArray[np.float32]) -> NDArray[np.float32]:

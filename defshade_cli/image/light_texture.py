@@ -6,11 +6,11 @@ import logging
 import math
 from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from defshade_cli.image.packed import stamp
 from defshade_cli.scene.light import Light, RectLight
 from defshade_cli.scene.texture import ImageFile
 
@@ -33,12 +33,11 @@ def with_texture(light: Light) -> Light:
 
 def read_radiance_map(file: ImageFile) -> RadianceMap | None:
     """The image, scene-linear Rec. 709; read once as long as the file does not change. None, logged, if it fails."""
-    path = Path(file.path)
-    return _read(file, path.stat().st_mtime_ns if path.exists() else 0)
+    return _read(file, stamp(file))
 
 
 @lru_cache(maxsize=8)
-def _read(file: ImageFile, _changed: int) -> RadianceMap | None:
+def _read(file: ImageFile, _version: int) -> RadianceMap | None:
     from defshade_cli.image.texture import Source, load_images
     from defshade_cli.scene.radiance_map import RadianceMap
 

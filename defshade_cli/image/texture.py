@@ -8,12 +8,10 @@ Values are the file's own: alpha is multiplied into nothing.
 from __future__ import annotations
 
 import logging
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import PurePath
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -21,6 +19,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from defshade_cli.dataclass import dataclass
+from defshade_cli.image.packed import on_disk
 from defshade_cli.image.reduction import reduced, resampled
 from defshade_cli.image.render_space import LINEAR_REC709
 from defshade_cli.image.transfer import linear
@@ -213,7 +212,7 @@ def _half(texels: NDArray[Any]) -> NDArray[np.float16]:
 @contextmanager
 def opened(file: ImageFile) -> Iterator[oiio.ImageInput]:
     """An open image. Raises OSError with the reason."""
-    with _on_disk(file) as path:
+    with on_disk(file) as path:
         as_stored = oiio.ImageSpec()
         as_stored.attribute("oiio:UnassociatedAlpha", 1)
         image = oiio.ImageInput.open(path, as_stored)
@@ -223,16 +222,3 @@ def opened(file: ImageFile) -> Iterator[oiio.ImageInput]:
             yield image
         finally:
             image.close()
-
-
-@contextmanager
-def _on_disk(file: ImageFile) -> Iterator[str]:
-    """A path that OpenImageIO opens; contents out of a package lie there for a while."""
-    if file.contents is None:
-        yield file.path
-        return
-    suffix = PurePath(file.path.rstrip("]")).suffix
-    with tempfile.NamedTemporaryFile(suffix=suffix) as copy:
-        copy.write(file.contents)
-        copy.flush()
-        yield copy.name

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
+from defshade_cli.image.packed import stamp
 from defshade_cli.image.texture import opened, place_of
 from defshade_cli.scene.texture import Channel, ImageFile
 
@@ -26,7 +25,7 @@ def below_one(file: ImageFile, channel: Channel) -> NDArray[np.int32]:
     Row 0 is at the bottom; of a channel that stands for several the first counts. One cell where all are alike.
     Raises OSError for what cannot be read.
     """
-    key = file.path, _stamp(file), channel
+    key = file.path, stamp(file), channel
     if key not in _KNOWN:
         while len(_KNOWN) >= _MOST_KEPT:
             _KNOWN.pop(next(iter(_KNOWN)))
@@ -37,11 +36,6 @@ def below_one(file: ImageFile, channel: Channel) -> NDArray[np.int32]:
 def _summed(cells: NDArray[np.bool_]) -> NDArray[np.int32]:
     sums = np.pad(cells, ((1, 0), (1, 0))).cumsum(axis=0, dtype=np.int32)
     return np.cumsum(sums, axis=1, dtype=np.int32, out=sums)
-
-
-def _stamp(file: ImageFile) -> int:
-    """Another where the file is another. Raises OSError."""
-    return Path(file.path).stat().st_mtime_ns if file.contents is None else hash(file.contents)
 
 
 def _looked_at(file: ImageFile, channel: Channel) -> NDArray[np.bool_]:

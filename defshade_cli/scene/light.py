@@ -152,7 +152,7 @@ class DomeLight(Light):
     environment: the sky itself where it is not a file's, in light space.
     """
 
-    texture: str | None = None
+    texture: ImageFile | None = None
     layout: SkyLayout = "automatic"
     environment: Environment | None = None
     kind = "dome"

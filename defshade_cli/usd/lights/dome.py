@@ -8,7 +8,9 @@ import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdLux
 
 from defshade_cli.scene.environment import SkyLayout
+from defshade_cli.scene.texture import ImageFile
 from defshade_cli.spaces import Matrix
+from defshade_cli.usd.materials.texture import Unreadable, image_file
 
 _Z_UP = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], np.float64)
 """The pole goes to +Z and latitude 0, longitude 0 to −Y, as DomeLight_1's schema says of a Z pole."""
@@ -19,7 +21,7 @@ def is_dome(prim: Usd.Prim) -> bool:
     return prim.IsA(UsdLux.DomeLight) or prim.IsA(UsdLux.DomeLight_1)
 
 
-def sky_texture(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[str | None, SkyLayout, str | None]:
+def sky_texture(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[ImageFile | None, SkyLayout, str | None]:
     """The file of the sky's image at `time` and its layout; or none, and why where one is authored."""
     asset = prim.GetAttribute("inputs:texture:file").Get(time) or Sdf.AssetPath()
     layout = prim.GetAttribute("inputs:texture:format").Get(time)
@@ -27,9 +29,13 @@ def sky_texture(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[str | None, SkyLayo
         return None, "automatic", None
     if not asset.resolvedPath:
         return None, "automatic", f"the texture {asset.path} is not found"
+    try:
+        file = image_file(asset.resolvedPath)
+    except Unreadable as problem:
+        return None, "automatic", f"the texture {asset.path} is ignored: {problem}"
     if layout not in get_args(SkyLayout):
-        return asset.resolvedPath, "automatic", f"there is no texture format {layout}: automatic is taken"
-    return asset.resolvedPath, layout, None
+        return file, "automatic", f"there is no texture format {layout}: automatic is taken"
+    return file, layout, None
 
 
 def pole(prim: Usd.Prim) -> Matrix:
