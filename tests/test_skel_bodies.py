@@ -8,7 +8,7 @@ import numpy as np
 
 from defshade_cli.usd.gprims.gprims import cube, sphere
 from defshade_cli.usd.polygons.normals import faceted
-from defshade_cli.usd.polygons.polygons import Primvar
+from defshade_cli.usd.polygons.polygons import Polygons, Primvar
 from defshade_cli.usd.skel.transport import transported
 from rigs import animation, moulded, rig, shape, world_points
 from stages import read, reasons
@@ -30,6 +30,17 @@ def test_hard_edges_stay_hard_under_a_shape_that_says_nothing_of_normals() -> No
     )
     assert found is not None and found.interpolation == "faceVarying"
     np.testing.assert_allclose(found.values, through_shear(authored), atol=1e-6)
+
+
+def test_normals_stay_outside_at_corners_that_turn_inwards_and_on_left_handed_faces() -> None:
+    """Of an L, whose corners run either way around."""
+    points = np.array([(0, 0, 0), (2, 0, 0), (2, 1, 0), (1, 1, 0), (1, 2, 0), (0, 2, 0)], np.float32)
+    up = Primvar(np.tile(np.float32([0.0, 0.0, 1.0]), (6, 1)), "faceVarying")
+    for order, left_handed in ((np.arange(6), False), (np.arange(6)[::-1], True)):
+        face = Polygons(points, np.array([6]), order, np.zeros(1, np.int32), left_handed=left_handed, normals=up)
+        found = transported(face, (points @ SHEAR.T).astype(np.float32))
+        assert found is not None
+        np.testing.assert_allclose(found.values, through_shear(up.values), atol=1e-6)
 
 
 def test_smooth_normals_stay_smooth_and_follow_the_surface() -> None:

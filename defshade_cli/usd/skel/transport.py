@@ -29,7 +29,7 @@ def transported(polygons: Polygons, points: NDArray[np.float32]) -> Primvar | No
     at_corners = polygons.at_corners(normals).astype(np.float64)
     a, b, m = np.einsum("fci,ci->fc", before, at_corners)[..., None]
     turned = normalize(a * cross(after[1], after[2]) + b * cross(after[2], after[0]) + m * cross(after[0], after[1]))
-    turned *= np.linalg.norm(cross(before[0], before[1]), axis=1, keepdims=True)
+    turned *= (np.linalg.norm(cross(before[0], before[1]), axis=1) * _handedness(after))[:, None]
     summed = np.stack([np.bincount(group, axis, count) for axis in turned.T], axis=1)
     found = np.linalg.norm(summed, axis=1, keepdims=True)
     old = normals.values if normals.interpolation != "faceVarying" else _of_groups(at_corners, group, count)
@@ -37,6 +37,12 @@ def transported(polygons: Polygons, points: NDArray[np.float32]) -> Primvar | No
     return replace(
         normals, values=(values[group] if normals.interpolation == "faceVarying" else values).astype(np.float32)
     )
+
+
+def _handedness(frames: Vectors) -> NDArray[np.float64]:
+    """(C,) −1 where the frame is a left one: at corners that turn inwards, and all others of left-handed polygons."""
+    along, back, normal = frames
+    return np.sign(np.sum(cross(along, back) * normal, axis=1))
 
 
 def _groups(polygons: Polygons, normals: Primvar) -> tuple[NDArray[np.intp], int]:
