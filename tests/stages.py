@@ -11,6 +11,7 @@ from pxr import Gf, Usd
 
 from defshade_cli.scene.geometry import Drawable
 from defshade_cli.scene.scene import Scene
+from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.reader import StageReader
 
 SUFFIXES = {".usd", ".usda", ".usdc", ".usdz"}
@@ -24,7 +25,7 @@ def stage_of(text: str, metadata: str = "") -> Usd.Stage:
 
 
 def read(text: str, frame: float | None = None, metadata: str = "", **options: Any) -> Scene:
-    return StageReader(stage_of(text, metadata), **options).read(frame)
+    return StageReader(stage_of(text, metadata), ReadOptions(**options)).read(frame)
 
 
 def move(x: float = 0, y: float = 0, z: float = 0) -> str:

@@ -10,6 +10,7 @@ from pxr import Usd, UsdGeom
 
 import stages
 from defshade_cli.usd.gprims.cages import SEGMENTS, capsule_cage, cone_cage, frustum_cage, sphere_cage
+from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.polygons.control import smooth_control
 from defshade_cli.usd.polygons.polygons import Polygons
 from defshade_cli.usd.polygons.refiner import Refiner
@@ -62,7 +63,8 @@ def test_a_refined_sphere_shrinks_to_the_limit_of_its_rings() -> None:
 
 def test_only_a_fixed_complexity_makes_cages() -> None:
     stage = stages.stage_of('def Sphere "ball" {\n}\n')
-    smooth, cage = (StageReader(stage, complexity=complexity).read(None).meshes[0] for complexity in ("auto", "low"))
+    options = ReadOptions(), ReadOptions(complexity="low")
+    smooth, cage = (StageReader(stage, each).read(None).meshes[0] for each in options)
     assert (smooth.level, cage.level) == (None, 0)
     assert len(cage.points) == 92 < len(smooth.points)
 

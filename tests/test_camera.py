@@ -20,6 +20,7 @@ from defshade_cli.scene.window import DataWindow
 from defshade_cli.settings import RenderSettings
 from defshade_cli.spaces import transform_points
 from defshade_cli.usd.camera import FRAMED, find_cameras, framed_camera
+from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.reader import StageReader
 from stages import reasons, stage_of
 
@@ -27,7 +28,7 @@ CUBE = 'def Cube "cube" {\n}\n'
 
 
 def read(text: str, frame: float | None = None, metadata: str = "", **options: str) -> Scene:
-    return StageReader(stage_of(CUBE + text, metadata), **options).read(frame)
+    return StageReader(stage_of(CUBE + text, metadata), ReadOptions(**options)).read(frame)
 
 
 def camera(body: str, frame: float | None = None) -> Camera:
@@ -46,25 +47,25 @@ TWO = 'def Camera "left" {\n}\ndef Xform "b" {\ndef Camera "right" {\n}\n}\n'
 
 @pytest.mark.parametrize("wanted", ["/b/right", "right"])
 def test_a_camera_is_found_by_path_and_by_name(wanted: str) -> None:
-    reader = StageReader(stage_of(CUBE + TWO), camera=wanted)
+    reader = StageReader(stage_of(CUBE + TWO), ReadOptions(camera=wanted))
     assert reader.camera_name == "right"
     assert reader.read(None).camera.path == "/b/right"
 
 
 def test_a_missing_camera_lists_the_others() -> None:
     with pytest.raises(PrimNotFound, match="no camera top; there are /left, /b/right"):
-        StageReader(stage_of(TWO), camera="top")
+        StageReader(stage_of(TWO), ReadOptions(camera="top"))
 
 
 def test_a_missing_camera_of_a_stage_without_any() -> None:
     with pytest.raises(PrimNotFound, match="no camera /cube; the stage has none"):
-        StageReader(stage_of(CUBE), camera="/cube")
+        StageReader(stage_of(CUBE), ReadOptions(camera="/cube"))
 
 
 def test_an_ambiguous_name_lists_its_cameras() -> None:
     text = 'def Xform "a" {\ndef Camera "cam" {\n}\n}\ndef Xform "b" {\ndef Camera "cam" {\n}\n}'
     with pytest.raises(PrimNotFound, match="2 cameras are named cam: /a/cam, /b/cam"):
-        StageReader(stage_of(text), camera="cam")
+        StageReader(stage_of(text), ReadOptions(camera="cam"))
 
 
 def test_the_render_settings_camera_goes_before_the_rule_of_one() -> None:

@@ -12,6 +12,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Complexity
 from defshade_cli.usd import memory
+from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.surfaces import tessellation
 
@@ -159,8 +160,8 @@ def alone(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("complexity", ["low", "medium"])
 @pytest.mark.parametrize("seed", range(6))
 def test_together_is_as_alone(seed: int, complexity: Complexity, monkeypatch: pytest.MonkeyPatch) -> None:
-    stage = random_stage(seed)
-    together = said(StageReader(stage, complexity=complexity).read(None))
+    stage, options = random_stage(seed), ReadOptions(complexity=complexity)
+    together = said(StageReader(stage, options).read(None))
     alone(monkeypatch)
-    for found, expected in zip(together, said(StageReader(stage, complexity=complexity).read(None)), strict=True):
+    for found, expected in zip(together, said(StageReader(stage, options).read(None)), strict=True):
         assert found == expected

@@ -19,6 +19,7 @@ from defshade_cli.rendering import render
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import Composition, RenderJob, VariantChoice
 from defshade_cli.usd.opening.stage import open_stage
+from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.reader import StageReader
 
 STAGE = """#usda 1.0
@@ -74,7 +75,7 @@ def stage(tmp_path: Path) -> Path:
 
 def read(stage: Path, camera: str | None = None, **composition: object) -> Scene:
     opened = open_stage(stage, Composition(**composition), camera)  # type: ignore[arg-type]
-    return StageReader(opened, camera=camera).read(None)
+    return StageReader(opened, ReadOptions(camera=camera)).read(None)
 
 
 def names(scene: Scene) -> set[str]:

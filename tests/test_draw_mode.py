@@ -15,6 +15,7 @@ from defshade_cli.image.texture import world_to_screen
 from defshade_cli.rendering import render
 from defshade_cli.scene.geometry import enclose, world_boxes
 from defshade_cli.scene.scene import Scene
+from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.reader import StageReader
 from stages import move, read, stage_of
 
@@ -94,7 +95,8 @@ def test_lines_are_no_thinner_than_a_pixel(scale: float) -> None:
         {move(z=100)}
     }}"""
     size = f"float3 xformOp:scale = ({scale}, {scale}, {scale})\nuniform token[] xformOpOrder = ['xformOp:scale']"
-    (drawable,) = StageReader(stage_of(model(mode("bounds") + size) + eye), size=(64, 64)).read(None).drawables
+    stage = stage_of(model(mode("bounds") + size) + eye)
+    (drawable,) = StageReader(stage, ReadOptions(size=(64, 64))).read(None).drawables
     pixel = 200 * math.tan(math.pi / 8) / 64
     widths = np.linalg.norm(drawable.world_from_object[:, :3, 1:3], axis=1)
     np.testing.assert_allclose(widths, pixel, rtol=0.04 * scale)

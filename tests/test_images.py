@@ -25,6 +25,7 @@ from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan, plan_moments
 from defshade_cli.settings import OutputSettings, RenderSettings
 from defshade_cli.usd.opening.stage import open_stage
+from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.reader import StageReader
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -90,7 +91,8 @@ def test_a_few_wrong_pixels_are_tolerated_and_a_shift_is_not() -> None:
 
 def _draw(pipeline: Pipeline, stage: str, frame: float | None, settings: RenderSettings) -> Film:
     opened = open_stage(resources.SCENES / f"{stage}.usda")
-    reader = StageReader(opened, purposes=settings.purposes, complexity=settings.complexity, size=settings.size)
+    options = ReadOptions(purposes=settings.purposes, complexity=settings.complexity, size=settings.size)
+    reader = StageReader(opened, options)
     scene = reader.read(reader.first_frame() if frame is None else frame)
     plan = make_plan(scene, settings)
     moments = plan_moments(plan, reader.read_shutter(scene, plan.moments), settings)

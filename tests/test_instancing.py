@@ -13,6 +13,7 @@ from pxr import Usd, UsdGeom
 
 from defshade_cli.usd.instancing.instancing import Piece, Placement, place
 from defshade_cli.usd.materials.binding import NOTHING_BOUND, Bindings
+from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.reader import StageReader
 from stages import (
     MATERIALS,
@@ -171,7 +172,7 @@ def test_purposes_are_handed_down_as_usd_computes_them(purposes: tuple[str, ...]
         for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
         if prim.IsA(UsdGeom.Gprim) and UsdGeom.Imageable(prim).ComputePurposeInfo().purpose in purposes
     }
-    assert set(placed(StageReader(stage, purposes=purposes).read(None))) == expected
+    assert set(placed(StageReader(stage, ReadOptions(purposes=purposes)).read(None))) == expected
 
 
 def test_a_reset_stack_inside_a_prototype_stands_in_the_world() -> None:

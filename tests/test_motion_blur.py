@@ -15,6 +15,7 @@ from defshade_cli.plan import make_plan, plan_moments
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderSettings
+from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.reader import StageReader
 from stages import stage_of
 
@@ -65,7 +66,9 @@ def _stage(quad: str, camera: str = FIXED, shutter: tuple[float, float] = (0.0, 
         )
     if "points" in quad:
         text = text.replace("point3f[] points = [(0, -1, 0), (1, -1, 0), (1, 1, 0), (0, 1, 0)]\n", "")
-    return StageReader(stage_of(opened + text, "timeCodesPerSecond = 24\nmetersPerUnit = 1"), size=(WIDTH, HEIGHT))
+    return StageReader(
+        stage_of(opened + text, "timeCodesPerSecond = 24\nmetersPerUnit = 1"), ReadOptions(size=(WIDTH, HEIGHT))
+    )
 
 
 def _beauty(pipeline: Pipeline, reader: StageReader, samples: int, **options: object) -> NDArray[np.float32]:

@@ -19,6 +19,7 @@ from defshade_cli.scene.product import Product, Variable
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import OutputSettings, RenderJob
 from defshade_cli.usd.opening.stage import open_stage
+from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.render_settings.products import read_products
 
@@ -256,7 +257,7 @@ def placed(scene: Scene) -> int:
 
 def test_a_pass_prunes_and_hides() -> None:
     Path("pass.usda").write_text(PASSES)
-    scene = StageReader(open_stage(Path("pass.usda")), render_settings="/pass").read(None)
+    scene = StageReader(open_stage(Path("pass.usda")), ReadOptions(render_settings="/pass")).read(None)
     assert placed(scene) == 2
     assert [light.path for light in scene.lights] == ["/key"]
     assert [str(issue.reason) for issue in scene.unsupported] == ["its collection matte is not followed"]
@@ -264,7 +265,7 @@ def test_a_pass_prunes_and_hides() -> None:
 
 def test_settings_alone_hide_nothing() -> None:
     Path("pass.usda").write_text(PASSES)
-    scene = StageReader(open_stage(Path("pass.usda")), render_settings="/settings").read(None)
+    scene = StageReader(open_stage(Path("pass.usda")), ReadOptions(render_settings="/settings")).read(None)
     assert (placed(scene), len(scene.lights)) == (4, 2)
 
 
@@ -298,7 +299,7 @@ def RenderSettings "everywhere" {
 def test_purposes_of_bindings(settings: str, material: str) -> None:
     """Without a word of the settings a preview goes before what is bound for all purposes, as for `usdview`."""
     Path("bound.usda").write_text(BOUND)
-    scene = StageReader(open_stage(Path("bound.usda")), render_settings=f"/{settings}").read(None)
+    scene = StageReader(open_stage(Path("bound.usda")), ReadOptions(render_settings=f"/{settings}")).read(None)
     assert [each.path for each in scene.materials] == [material]
 
 

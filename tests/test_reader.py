@@ -11,6 +11,7 @@ from pxr import Usd, UsdGeom
 
 from defshade_cli.errors import DefshadeError, EmptyStage
 from defshade_cli.usd.opening.stage import open_stage
+from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.reader import StageReader
 from stages import column_vectors, placed, positions, read, reasons, stage_of, stages_in
 
@@ -143,9 +144,9 @@ def test_purposes_are_as_usd_computes_them(purposes: tuple[str, ...]) -> None:
     expected = {str(gprim.GetPath()) for gprim in gprims if gprim.ComputePurposeInfo().purpose in purposes}
     if not expected:
         with pytest.raises(EmptyStage):
-            StageReader(stage, purposes=purposes).read(None)
+            StageReader(stage, ReadOptions(purposes=purposes)).read(None)
     else:
-        assert set(placed(StageReader(stage, purposes=purposes).read(None))) == expected
+        assert set(placed(StageReader(stage, ReadOptions(purposes=purposes)).read(None))) == expected
 
 
 @pytest.mark.parametrize("name", ["InheritedPurposes.usd", "InheritedPurposes_Instanced.usd"])
@@ -158,7 +159,7 @@ def test_purposes_of_a_stage_by_others(assets: Path, name: str) -> None:
             for prim in prims
             if prim.IsA(UsdGeom.Gprim) and UsdGeom.Imageable(prim).ComputePurposeInfo().purpose in purposes
         }
-        assert set(placed(StageReader(stage, purposes=purposes).read(None))) == expected
+        assert set(placed(StageReader(stage, ReadOptions(purposes=purposes)).read(None))) == expected
 
 
 @pytest.mark.parametrize(

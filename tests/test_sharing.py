@@ -13,6 +13,7 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.settings import RenderSettings
+from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.polygons import cut as cutting
 from defshade_cli.usd.polygons import refiner
 from defshade_cli.usd.reader import StageReader
@@ -56,7 +57,7 @@ def test_equal_parts_become_one_object() -> None:
 
 @pytest.mark.parametrize("scheme", ["none", "catmullClark"])
 def test_moving_points_are_all_that_is_made_anew(scheme: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    reader = StageReader(stage_of(GRID.replace("SCHEME", scheme)), complexity="medium")
+    reader = StageReader(stage_of(GRID.replace("SCHEME", scheme)), ReadOptions(complexity="medium"))
     (first,) = reader.read(0).meshes
     with monkeypatch.context() as patched:
         for module, name in ((cutting, "triangulate"), (shape, "read_mesh"), (refiner, "refine")):

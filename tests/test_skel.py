@@ -10,6 +10,7 @@ from pxr import Gf, Usd, UsdSkel, Vt
 from scipy.spatial.transform import Rotation
 
 from defshade_cli.usd.opening.stage import open_stage
+from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.skel.influences import Influences
 from defshade_cli.usd.skel.skinning import DualQuaternionBlend, LinearBlend
@@ -72,7 +73,7 @@ def test_points_and_normals_are_usds(method: str, scaled: bool) -> None:
 
 def test_the_skinned_arm_is_its_baked_twin(assets: Path) -> None:
     skinned, baked = (
-        StageReader(open_stage(assets / "ousd_skel_a/UsdSkel" / name), complexity="low")
+        StageReader(open_stage(assets / "ousd_skel_a/UsdSkel" / name), ReadOptions(complexity="low"))
         for name in ("arm.usda", "arm_baked.usda")
     )
     for frame in (1, 3, 7, 10):
@@ -101,7 +102,7 @@ def test_stages_are_as_usd_bakes_them(name: str, frames: tuple[int, ...], reques
         if prim.IsA(UsdSkel.Root):
             prim.SetInstanceable(False)
             assert UsdSkel.BakeSkinning(UsdSkel.Root(prim), Gf.Interval(min(frames), max(frames)))
-    readers = [StageReader(stage, complexity="low") for stage in (open_stage(path), baked)]
+    readers = [StageReader(stage, ReadOptions(complexity="low")) for stage in (open_stage(path), baked)]
     for frame in frames:
         found, expected = (world_points(reader.read(frame)) for reader in readers)
         assert found.keys() == expected.keys()

@@ -14,6 +14,7 @@ from defshade_cli.scene.product import Product
 from defshade_cli.settings import RenderJob, RenderSettings
 from defshade_cli.usd.blame import blaming
 from defshade_cli.usd.opening.stage import first_frame, open_stage
+from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.render_settings.products import lost_products, read_products
 from defshade_cli.usd.render_settings.saved_settings import read_own_settings
@@ -76,8 +77,7 @@ class OpenJob:
     def _new_reader(self, product: Product) -> StageReader:
         job, settings = self._job, self._job.settings
         layers = {layer for other in self._products(self.frames[0]) for layer in layers_of(job, other)}
-        return StageReader(
-            self._stage,
+        options = ReadOptions(
             camera=job.camera,
             render_settings=job.render_settings,
             product=product.path,
@@ -89,8 +89,8 @@ class OpenJob:
             studio=settings.studio,
             extras=extras_of(layers),
             seen_from=_world_to_screen,
-            beside=next(iter(self._readers.values()), None),
         )
+        return StageReader(self._stage, options, beside=next(iter(self._readers.values()), None))
 
 
 def _world_to_screen(file: ImageFile) -> Matrix | None:

@@ -13,15 +13,12 @@ from pxr import Usd
 
 from defshade_cli.errors import EmptyStage
 from defshade_cli.garbage import uncollected
-from defshade_cli.scene.extras import NO_EXTRAS, Extras
 from defshade_cli.scene.geometry import Drawable, Mesh
 from defshade_cli.scene.light import Light
 from defshade_cli.scene.scene import Scene, Unsupported
-from defshade_cli.scene.texture import SeenFrom
 from defshade_cli.scene.view import View
-from defshade_cli.settings import Complexity
 from defshade_cli.usd.blame import blaming
-from defshade_cli.usd.camera import choose_camera, find_cameras
+from defshade_cli.usd.camera import find_cameras
 from defshade_cli.usd.drawables import drawables_of
 from defshade_cli.usd.facing import PlacedSurface, faced
 from defshade_cli.usd.instancing.instancing import Piece
@@ -30,6 +27,7 @@ from defshade_cli.usd.lights.shining import glowing_surfaces, lit, shining
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.opening import stage as facts
 from defshade_cli.usd.opening.unresolved import by_reason, find_unresolved
+from defshade_cli.usd.options import AS_IT_IS, ReadOptions
 from defshade_cli.usd.palette import Palette
 from defshade_cli.usd.render_settings.render_pass import pass_issues, read_pass
 from defshade_cli.usd.render_settings.settings import read_settings
@@ -41,7 +39,6 @@ from defshade_cli.usd.surfaces.tessellation import Tessellation
 from defshade_cli.usd.traversal import Traversal
 
 if TYPE_CHECKING:
-    from defshade_cli.scene.framing import Framing, Held
     from defshade_cli.scene.motion import Moment
 
 log = logging.getLogger("defshade")
@@ -50,52 +47,25 @@ log = logging.getLogger("defshade")
 class StageReader:
     """Reads frames of one stage. What does not change over time is read once, and stays the same object.
 
-    camera: path or name; without it the rule of usd/camera.py picks.
-    purposes: of the geometry that is drawn; without them those of the render settings.
-    render_settings, product: paths of their prims; settings are found as usd/render_settings/products.py does.
-    complexity: of subdivision surfaces and, where it is not `auto`, of solids as Hydra makes cages of them; for `auto`
-        it matters how large the image is, see scene.camera.image_size.
-    framing: a camera of ours in place of the stage's.  studio: lights of ours where the stage has none.
-    extras: what only some layers need.  seen_from: for cards placed by their textures, which reads their headers.
     beside: a reader of the same stage, whose memory is shared.
     Raises PrimNotFound for a camera or render settings that the stage lacks.
     """
 
-    def __init__(
-        self,
-        stage: Usd.Stage,
-        *,
-        camera: str | None = None,
-        purposes: Sequence[str] | None = None,
-        render_settings: str | None = None,
-        product: str = "",
-        complexity: Complexity = "auto",
-        size: tuple[int, int] | None = None,
-        width: int | None = None,
-        framing: Framing | Held | None = None,
-        studio: bool = False,
-        extras: Extras = NO_EXTRAS,
-        seen_from: SeenFrom | None = None,
-        beside: StageReader | None = None,
-    ) -> None:
-        self._complexity, self._extras, self._studio = complexity, extras, studio
-        as_cages = complexity != "auto"
-        self._memory: Memory = (
-            beside._memory if beside else Memory(stage, extras, as_cages=as_cages, seen_from=seen_from)
-        )
+    def __init__(self, stage: Usd.Stage, options: ReadOptions = AS_IT_IS, *, beside: StageReader | None = None) -> None:
+        self._stage, self._options = stage, options
+        self._memory: Memory = beside._memory if beside else _memory(stage, options)
         self._tessellation: Tessellation = beside._tessellation if beside else Tessellation()
-        self._settings = read_settings(stage, render_settings, product)
-        self._stage, self._purposes = stage, tuple(self._settings.purposes if purposes is None else purposes)
+        self._settings = read_settings(stage, options.render_settings, options.product)
+        self._purposes = tuple(self._settings.purposes if options.purposes is None else options.purposes)
         self._levels: dict[str, int] = {}
         self._last: Scene | None = None
         self._lights: dict[str, Light] = {}
-        self._pass = read_pass(stage, render_settings)
+        self._pass = read_pass(stage, options.render_settings)
         self._cameras = find_cameras(stage)
-        chosen = None if framing else choose_camera(stage, self._cameras, camera, self._settings.camera)
-        self._sight = Sight(stage, self._settings, chosen, framing, size, width)
+        self._sight = Sight(stage, self._settings, self._cameras, options)
         unresolved = tuple(arc.unsupported for arc in find_unresolved(stage))
         self._told = set(unresolved)  # by open_stage
-        self._issues = (*unresolved, *pass_issues(stage, render_settings))
+        self._issues = (*unresolved, *pass_issues(stage, options.render_settings))
 
     @property
     def camera_name(self) -> str:
@@ -119,11 +89,11 @@ class StageReader:
         with facts.gathered_diagnostics(), blaming(self._stage):
             levels = self._levels = {}
             scene = self._read(frame, time, levels)
-            if self._extras.motion and frame is not None:
+            if self._options.extras.motion and frame is not None:
                 neighbours = tuple(self._moment(scene, frame + step, levels) for step in (-1.0, 1.0))
                 scene = replace(scene, neighbours=neighbours)
         self._tell(scene.unsupported)
-        scene = lit(scene, studio=self._studio)
+        scene = lit(scene, studio=self._options.studio)
         self._last = scene
         return scene
 
@@ -137,7 +107,7 @@ class StageReader:
             time = Usd.TimeCode(scene.frame + offset)
             with facts.silence(), blaming(self._stage):
                 moment = self._read(scene.frame, time, self._levels)
-            yield lit(moment, studio=self._studio)
+            yield lit(moment, studio=self._options.studio)
 
     def _tell(self, issues: Iterable[Unsupported]) -> None:
         """Log what the picture lacks, or shows otherwise than authored, when it is first met."""
@@ -164,7 +134,7 @@ class StageReader:
             raise EmptyStage(_empty(self._stage, traversal.found.issues))
         camera, camera_issues = self._sight.camera(frame, time, placed, self._placed_at)
         view = self._sight.view(camera)
-        drawn = tuple(faced(drawn, view, UNIFORM_LEVELS.get(self._complexity)))
+        drawn = tuple(faced(drawn, view, UNIFORM_LEVELS.get(self._options.complexity)))
         gprims = self._tessellate(drawn, view, levels)
         palette = Palette(self._memory.materials, time, self._settings.material_purposes)
         meshes: dict[Mesh, int] = {}
@@ -191,8 +161,8 @@ class StageReader:
             pixel_aspect=self._settings.pixel_aspect_for(camera),
             conform=self._settings.conform,
             data_window=self._settings.data_window,
-            labels=self._labels(drawables, time) if self._extras.labels else {},
-            assets=self._assets(drawables) if self._extras.assets else {},
+            labels=self._labels(drawables, time) if self._options.extras.labels else {},
+            assets=self._assets(drawables) if self._options.extras.assets else {},
             purposes=self._purposes,
             rendering_space=self._settings.rendering_space,
         )
@@ -224,7 +194,7 @@ class StageReader:
     @cached_property
     def is_still(self) -> bool:
         """Is every frame like the first? The neighbours that motion asks for are read with their frame."""
-        return not (self._sight.turns or self._extras.motion or self._may_change)
+        return not (self._sight.turns or self._options.extras.motion or self._may_change)
 
     @cached_property
     def _may_change(self) -> bool:
@@ -238,10 +208,14 @@ class StageReader:
 
     def _tessellate(self, drawn: Iterable[PlacedSurface], view: View, levels: dict[str, int]) -> dict[Surface, Gprim]:
         placed = ((surface, piece.root_from_object) for piece, surface in drawn)
-        chosen = choose_levels(placed, self._complexity, view)
+        chosen = choose_levels(placed, self._options.complexity, view)
         return self._tessellation.at_levels(
             {surface: levels.setdefault(surface.path, level) for surface, level in chosen.items()}
         )
+
+
+def _memory(stage: Usd.Stage, options: ReadOptions) -> Memory:
+    return Memory(stage, options.extras, as_cages=options.as_cages, seen_from=options.seen_from)
 
 
 def _paths(drawables: Iterable[Drawable]) -> dict[str, None]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,35 +13,26 @@ from defshade_cli.scene.geometry import enclose, world_boxes
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.scene.view import View
 from defshade_cli.spaces import Window, conform_window
-from defshade_cli.usd.camera import default_window, framed_camera, read_camera
+from defshade_cli.usd.camera import choose_camera, default_window, framed_camera, read_camera
 from defshade_cli.usd.facing import PlacedSurface
 from defshade_cli.usd.opening import stage as facts
+from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.render_settings.settings import StageSettings
 from defshade_cli.usd.surfaces.extent import extents_of
-
-if TYPE_CHECKING:
-    from defshade_cli.scene.framing import Framing, Held
 
 
 class Sight:
     """Of one stage, frame after frame.
 
-    camera: of the stage, where one counts.  framing: a camera of ours in its place.
-    size, width: what is asked for, see scene.camera.image_size.
+    cameras: paths of all that the stage has. Raises PrimNotFound for one that it lacks.
     """
 
     def __init__(
-        self,
-        stage: Usd.Stage,
-        settings: StageSettings,
-        camera: Usd.Prim | None,
-        framing: Framing | Held | None,
-        size: tuple[int, int] | None,
-        width: int | None,
+        self, stage: Usd.Stage, settings: StageSettings, cameras: tuple[str, ...], options: ReadOptions
     ) -> None:
-        self._stage, self._settings = stage, settings
-        self._camera, self._framing = camera, framing
-        self._size, self._width = size, width
+        self._stage, self._settings, self._options = stage, settings, options
+        self._framing = options.framing
+        self._camera = None if self._framing else choose_camera(stage, cameras, options.camera, settings.camera)
         self._bounds_at_start: NDArray[np.float64] | None = None
 
     @property
@@ -90,7 +80,7 @@ class Sight:
         return conform_window(window, width / height)
 
     def _image_size(self, aspect: float) -> tuple[int, int]:
-        return image_size(aspect, self._size, self._width, self._settings.resolution)
+        return image_size(aspect, self._options.size, self._options.width, self._settings.resolution)
 
     def _bounds_of_turn(self, placed_at: Callable[[Usd.TimeCode], Sequence[PlacedSurface]]) -> NDArray[np.float64]:
         """(2, 3) at the stage's first frame: a turn shall not sway with what moves."""

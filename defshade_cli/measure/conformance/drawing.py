@@ -34,6 +34,7 @@ from defshade_cli.scene.framing import Held
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderSettings
 from defshade_cli.usd.opening.stage import open_stage
+from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.reader import StageReader
 from defshade_cli.usd.surfaces.extent import stage_extent
 
@@ -75,7 +76,7 @@ def draw(case: Case, pipeline: Pipeline) -> Drawn:
     start = time.perf_counter()
     size = _size(case, reference)
     stage = _stage(case)
-    reader = _reader(case, stage, size)
+    reader = StageReader(stage, _options(case, size))
     scene = _scene(case, stage, reader, size)
     read_at = time.perf_counter()
     settings = RenderSettings(size=size, shadows=case.maker != "storm", background=_shows_sky(case, reference))
@@ -112,15 +113,10 @@ def _stage(case: Case) -> Any:
     return stage
 
 
-def _reader(case: Case, stage: Any, size: tuple[int, int], **seen: Any) -> StageReader:
-    """seen: in place of the camera that the conditions name."""
+def _options(case: Case, size: tuple[int, int]) -> ReadOptions:
     conditions = case.conditions
-    return StageReader(
-        stage,
-        purposes=conditions.purposes,
-        complexity=conditions.complexity,
-        size=size,
-        **(seen or {"camera": conditions.camera}),
+    return ReadOptions(
+        camera=conditions.camera, purposes=conditions.purposes, complexity=conditions.complexity, size=size
     )
 
 
@@ -131,7 +127,8 @@ def _scene(case: Case, stage: Any, reader: StageReader, size: tuple[int, int]) -
     scene = under(conditions, reader.read(frame), stage_extent(stage, conditions.purposes))
     if conditions.background is None:
         return with_bare(conditions, scene)
-    seen = _reader(case, stage, size, framing=Held(scene.camera), beside=reader).read(frame)
+    held = replace(_options(case, size), camera=None, framing=Held(scene.camera))
+    seen = StageReader(stage, held, beside=reader).read(frame)
     return with_bare(conditions, replace(scene, meshes=seen.meshes, drawables=seen.drawables))
 
 
