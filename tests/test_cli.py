@@ -174,7 +174,12 @@ def test_version() -> None:
         pytest.param(2, ".xyz", ["render", "stages/triangle.usda", "-o", "out.xyz"], id="unknown format"),
         pytest.param(2, "ends with its format", ["render", "stages/triangle.usda", "-o", "out"], id="no format"),
         pytest.param(2, "Radio", ["render", "stages/triangle.usda", "--display", "Radio"], id="display for no picture"),
-        pytest.param(5, "stats.json", ["render", "stages/triangle.usda", "--stats", "no/stats.json"], id="stats"),
+        pytest.param(
+            5,
+            "stats.json",
+            ["render", "stages/triangle.usda", "--stats", "stages/triangle.usda/stats.json"],
+            id="stats",
+        ),
         pytest.param(2, "rsme", ["compare", "a.exr", "b.exr", "--threshold", "rsme=1"], id="unknown metric"),
         pytest.param(5, "missing.exr", ["compare", "missing.exr", "missing.exr"], id="nothing to compare"),
     ],

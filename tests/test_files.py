@@ -17,6 +17,7 @@ import pytest
 
 from defshade_cli.errors import OutputError, UsageError
 from defshade_cli.image import files, reading
+from defshade_cli.image.appearing import write_text
 from defshade_cli.image.encoders import SUFFIXES, check_format
 from defshade_cli.image.film import Film
 from defshade_cli.image.layers import LAYERS
@@ -368,3 +369,15 @@ def test_what_reads_back_otherwise_is_refused(
     with pytest.raises(OutputError, match="layer depth read back otherwise"):
         files.write(frame, replace(output, verify=True), tmp_path / "a.exr")
     assert not any(tmp_path.iterdir())
+
+
+def test_a_text_file_appears_whole_and_a_stream_has_it_at_once(tmp_path: Path) -> None:
+    write_text(tmp_path / "new" / "record.json", "{}\n")
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["record.json"]
+    from_there, writing = os.pipe()
+    write_text(Path(f"/dev/fd/{writing}"), "told")
+    os.close(writing)
+    with os.fdopen(from_there) as told:
+        assert told.read() == "told"
+    with pytest.raises(OutputError, match=f"cannot write {tmp_path}: Is a directory"):
+        write_text(tmp_path, "")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,11 +12,14 @@ import click
 from defshade_cli import __version__, settings
 from defshade_cli.cli.names import Names
 from defshade_cli.cli.options import Function, HeadedCommand, Option, epilog, make_job, take
+from defshade_cli.cli.options.image import size_options
+from defshade_cli.cli.options.run import device_option
 from defshade_cli.cli.options.stage import stage_options
 from defshade_cli.cli.progress import show_log
-from defshade_cli.cli.stats import plain
-from defshade_cli.cli.types import Counts, Positive, Size, Whole
-from defshade_cli.errors import OutputError, UsageError
+from defshade_cli.cli.stats import plain, write_record
+from defshade_cli.cli.types import Counts, Positive, Whole
+from defshade_cli.errors import UsageError
+from defshade_cli.image.appearing import write_text
 from defshade_cli.settings import RenderJob
 
 if TYPE_CHECKING:
@@ -35,17 +37,10 @@ _EPILOG = epilog(
 
 
 def _bench_options() -> list[Function]:
-    image = functools.partial(click.option, cls=Option, heading="Image")
     option = functools.partial(click.option, cls=Option, heading="Bench")
     file = click.Path(dir_okay=False, path_type=Path)
     return [
-        image("--size", type=Size(), metavar="WxH", help="Size in pixels. The default is the stage's, then 1920x1080."),
-        image(
-            "--width",
-            type=Whole(min=1),
-            metavar="PIXELS",
-            help="Width in pixels; the height follows the camera's aspect.",
-        ),
+        *size_options(),
         option(
             "--layouts",
             type=Names("layout", settings.LAYOUTS),
@@ -123,12 +118,7 @@ def _bench_options() -> list[Function]:
             metavar="FILE.svg",
             help="Draw run time against error; for several stages a file each, named by the stage.",
         ),
-        option(
-            "--device",
-            type=Whole(min=0),
-            metavar="N",
-            help="Graphics device, by its index in 'defshade doctor'.",
-        ),
+        device_option("Bench"),
         option("-q", "--quiet", is_flag=True, help="Do not tell what is at work."),
     ]
 
@@ -187,7 +177,7 @@ def bench(
                 _write_plot(found, cost, plot_file if len(jobs) == 1 else _beside(plot_file, job.stage))
     if json_file is not None:
         record = {"version": __version__, "cost": cost, "stages": [_record(b, cost, most_error) for b in benches]}
-        _write(json_file, json.dumps(plain(record), indent=2, allow_nan=False) + "\n")
+        write_record(json_file, record)
 
 
 def _show(bench: Bench, cost: Cost, most_error: float | None) -> None:
@@ -240,18 +230,11 @@ def _record(bench: Bench, cost: Cost, most_error: float | None) -> dict[str, Any
 def _write_plot(bench: Bench, cost: Cost, path: Path) -> None:
     from defshade_cli.measure.bench.plot import plot
 
-    _write(path, plot(bench, cost))
+    write_text(path, plot(bench, cost))
 
 
 def _beside(path: Path, stage: Path) -> Path:
     return path.with_name(f"{path.stem}.{stage.stem}{path.suffix}")
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror}") from error
 
 
 def _say(line: str, quiet: bool) -> None:

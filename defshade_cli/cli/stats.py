@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from defshade_cli import __version__
-from defshade_cli.errors import OutputError
+from defshade_cli.image.appearing import write_text
 from defshade_cli.settings import RenderJob
 
 if TYPE_CHECKING:
@@ -43,15 +43,15 @@ class Stats:
             self._record["frames"].append(_frame_figures(result))
 
     def _write(self) -> None:
-        if self._path is None:
-            return
-        import json
+        if self._path is not None:
+            write_record(self._path, self._record)
 
-        text = json.dumps(plain(self._record), indent=2, allow_nan=False)
-        try:
-            self._path.write_text(text + "\n", encoding="utf-8")
-        except OSError as error:
-            raise OutputError(f"cannot write {self._path}: {error.strerror}") from error
+
+def write_record(path: Path, record: dict[str, Any]) -> None:
+    """A file of JSON. Raises OutputError."""
+    import json
+
+    write_text(path, json.dumps(plain(record), indent=2, allow_nan=False) + "\n")
 
 
 def plain(value: Any) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,8 +14,7 @@ import click
 from defshade_cli import __version__
 from defshade_cli.cli.options import Reporting
 from defshade_cli.cli.progress import failure, frame_name
-from defshade_cli.cli.stats import plain
-from defshade_cli.errors import OutputError
+from defshade_cli.cli.stats import write_record
 from defshade_cli.settings import RenderJob
 
 if TYPE_CHECKING:
@@ -94,13 +92,8 @@ class Tally:
                 click.echo(line, err=True)
 
     def _write(self) -> None:
-        path = self._reporting.stats
-        if path is None:
-            return
-        try:
-            path.write_text(json.dumps(plain(self._record), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        except OSError as error:
-            raise OutputError(f"cannot write {path}: {error.strerror}") from error
+        if self._reporting.stats is not None:
+            write_record(self._reporting.stats, self._record)
 
 
 def _failures(outcomes: Iterable[Outcome]) -> Iterator[str]:

@@ -15,7 +15,8 @@ from typing import Any
 
 from defshade_cli.errors import OutputError
 from defshade_cli.farm.tasks import Outcome
-from defshade_cli.image.page import filled, place
+from defshade_cli.image.appearing import write_text
+from defshade_cli.image.page import filled
 from defshade_cli.image.reading import read_header
 from defshade_cli.image.thumbnail import thumbnails
 
@@ -34,8 +35,8 @@ def write_report(outcomes: Sequence[Outcome], seconds: float, path: Path) -> Non
         layers="".join(_button(layer) for layer in layers),
         stages="".join(_stages(frames)),
     )
-    place(path, page)
-    place(path.with_suffix(".json"), json.dumps(record, indent=2) + "\n")
+    write_text(path, page)
+    write_text(path.with_suffix(".json"), json.dumps(record, indent=2) + "\n")
 
 
 def _order(outcome: Outcome) -> tuple[str, float]:

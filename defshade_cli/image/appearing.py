@@ -6,8 +6,10 @@ import os
 import platform
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
+
+from defshade_cli.errors import OutputError
 
 
 def hidden_prefix() -> str:
@@ -25,3 +27,13 @@ def appearing_at(path: Path) -> Iterator[Path]:
         hidden.replace(path)
     finally:
         hidden.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """A text file that appears whole; folders are made. A pipe or a terminal has it at once. Raises OutputError."""
+    is_stream = path.exists() and not path.is_file()
+    try:
+        with nullcontext(path) if is_stream else appearing_at(path) as hidden:
+            hidden.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror}") from error

@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from defshade_cli.image.appearing import write_text
 from defshade_cli.image.colour import DisplayTransform, Pixels
 from defshade_cli.image.inline import packed, png_address
 from defshade_cli.image.look import Look, look_at
-from defshade_cli.image.page import filled, place
+from defshade_cli.image.page import filled
 from defshade_cli.image.stored import StoredImage
 
 _TEMPLATE = Path(__file__).with_name("viewer.html")
@@ -42,7 +43,7 @@ def write_viewer(
     images = [_image(*shot) for shot in shots]
     text = json.dumps({"images": images, "stops": stops}, separators=(",", ":")).replace("<", "\\u003c")
     title = ", ".join(image.path.name for image, _, _ in shots)
-    place(path, filled(_TEMPLATE, title=html.escape(title), page=text))
+    write_text(path, filled(_TEMPLATE, title=html.escape(title), page=text))
 
 
 def _image(image: StoredImage, names: tuple[str, ...], transform: DisplayTransform) -> dict[str, Any]:

@@ -21,18 +21,7 @@ def image_options(layers: Sequence[str] = ()) -> list[Function]:
     """Under the heading Image. layers: written when the user names none."""
     option = functools.partial(click.option, cls=Option, heading="Image")
     return [
-        option(
-            "--size",
-            type=Size(),
-            metavar="WxH",
-            help="Size in pixels. The default is the stage's render settings, then 1920x1080.",
-        ),
-        option(
-            "--width",
-            type=Whole(min=1),
-            metavar="PIXELS",
-            help="Width in pixels; the height follows the camera's aspect.",
-        ),
+        *size_options(),
         option(
             "--crop",
             type=Crop(),
@@ -59,6 +48,25 @@ def image_options(layers: Sequence[str] = ()) -> list[Function]:
         ),
         *sampling_options(),
         *_shading_options(),
+    ]
+
+
+def size_options() -> list[Function]:
+    """Under the heading Image: they exclude each other."""
+    option = functools.partial(click.option, cls=Option, heading="Image")
+    return [
+        option(
+            "--size",
+            type=Size(),
+            metavar="WxH",
+            help="Size in pixels. The default is the stage's render settings, then 1920x1080.",
+        ),
+        option(
+            "--width",
+            type=Whole(min=1),
+            metavar="PIXELS",
+            help="Width in pixels; the height follows the camera's aspect.",
+        ),
     ]
 
 

@@ -36,16 +36,23 @@ class Reporting:
         return self.isolate or self.memory_limit is not None or self.timeout is not None
 
 
+def device_option(heading: str) -> Function:
+    """Which graphics device draws."""
+    return click.option(
+        "--device",
+        cls=Option,
+        heading=heading,
+        type=Whole(min=0),
+        metavar="N",
+        help="Graphics device, by its index in 'defshade doctor'.",
+    )
+
+
 def run_options() -> list[Function]:
     """Under the heading Run."""
     option = functools.partial(click.option, cls=Option, heading="Run")
     return [
-        option(
-            "--device",
-            type=Whole(min=0),
-            metavar="N",
-            help="Graphics device, by its index in 'defshade doctor'.",
-        ),
+        device_option("Run"),
         option(
             "--stats",
             type=click.Path(dir_okay=False, path_type=Path),
