@@ -25,7 +25,7 @@ from pathlib import Path
 from bench_stages import GENERATED, generate
 from glb import write_glb
 
-from defshade_cli.measure.layouts import replace_generated
+from defshade_cli.measure.sections import replace_generated
 
 PEERS = Path(__file__).parent / "peers"
 LIMIT = 600.0

@@ -23,9 +23,10 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.compare import compare
 from defshade_cli.image.reading import read
 from defshade_cli.measure.bench import Sweep, Trial, run_sweep
-from defshade_cli.measure.layouts import first_frame, replace_generated
+from defshade_cli.measure.layouts import first_frame
 from defshade_cli.measure.mitsuba_plugins import mi
 from defshade_cli.measure.pathtraced import mitsuba_world
+from defshade_cli.measure.sections import replace_generated
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.settings import RenderJob, RenderSettings

@@ -19,7 +19,7 @@ import dask_scale
 import throughput
 
 from defshade_cli.farm.tasks import LARGEST_CHUNK, check_batch
-from defshade_cli.measure.layouts import replace_generated
+from defshade_cli.measure.sections import replace_generated
 from defshade_cli.settings import OutputSettings, RenderJob
 
 FRAMES, HOSTS, WORKERS_A_HOST = 1_000_000, 1000, 2

@@ -17,9 +17,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from lights_plot import draw_plot
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.measure.layouts import replace_generated
+from defshade_cli.measure.sections import replace_generated
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.plan.cost import covered_share
@@ -90,7 +91,7 @@ def row(pipeline: Pipeline, count: int, reach: float, size: tuple[int, int]) -> 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("size", nargs="?", default="1920x1080")
-    parser.add_argument("--page", type=Path, help="write the table into this page in place of printing it")
+    parser.add_argument("--page", type=Path, help="write the table and its plot into this page, and print neither")
     asked = parser.parse_args()
     width, height = map(int, asked.size.split("x"))
     lines = [
@@ -104,6 +105,7 @@ def main() -> None:
     content = f"{width}x{height}, CPU-seconds.\n\n" + "\n".join(lines)
     if asked.page:
         asked.page.write_text(replace_generated(asked.page.read_text("utf-8"), "lights", content), "utf-8")
+        draw_plot(asked.page)
     else:
         print(content)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import shlex
 from collections.abc import Iterator
@@ -40,6 +41,16 @@ def test_plot_of_accuracy_is_up_to_date() -> None:
     plot = (ROOT / "docs" / "images" / "accuracy.svg").read_text(encoding="utf-8")
     stale = "docs/images/accuracy.svg is stale: run `python -m defshade_cli.measure.accuracy_plot docs/accuracy.md`"
     assert plot == accuracy_plot(errors), stale
+
+
+def test_plot_of_lights_is_up_to_date(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    lights = importlib.import_module("lights_plot")
+    seconds = lights.seconds_in((ROOT / "docs" / "performance.md").read_text(encoding="utf-8"))
+    assert [len(row) for row in seconds.values()] == [6, 6, 3]
+    plot = (ROOT / "docs" / "images" / "lights.svg").read_text(encoding="utf-8")
+    stale = "docs/images/lights.svg is stale: run `python benchmarks/lights_plot.py docs/performance.md`"
+    assert plot == lights.lights_plot(seconds), stale
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -12,7 +12,8 @@ import pytest
 from defshade_cli import resources
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.measure.error import RelativeError, relative_error
-from defshade_cli.measure.layouts import first_frame, layout_errors, layout_table, referenced_stages, replace_generated
+from defshade_cli.measure.layouts import first_frame, layout_errors, layout_table, referenced_stages
+from defshade_cli.measure.sections import replace_generated
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.scene import Scene

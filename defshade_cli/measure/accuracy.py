@@ -19,8 +19,9 @@ from defshade_cli import resources
 from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.compare import Comparison, compare
-from defshade_cli.measure.layouts import first_frame, replace_generated
+from defshade_cli.measure.layouts import first_frame
 from defshade_cli.measure.pathtraced import Reference, path_traced
+from defshade_cli.measure.sections import replace_generated
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import Plan, make_plan
 from defshade_cli.scene.scene import Scene

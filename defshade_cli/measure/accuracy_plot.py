@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
-from defshade_cli.measure.axes import HEIGHT, MARGIN, OPENING, WIDTH, Axis, grid, text
+from defshade_cli.measure.axes import HEIGHT, MARGIN, OPENING, WIDTH, Axis, grid, legend, text
+from defshade_cli.measure.sections import generated
 
 _SAMPLES = (1, 16, 256)
 _ROW = re.compile(r"^\| (\w+) \|" + r" ([\de.+-]+|not run) \|" * len(_SAMPLES), re.MULTILINE)
@@ -25,8 +26,7 @@ Errors = Mapping[str, Mapping[int, float]]
 
 def errors_in(page: str) -> Errors:
     """Stage → samples → relMSE of the table in a page; what was not run is left out."""
-    table = page.partition("<!-- generated: accuracy -->")[2].partition("<!-- end")[0]
-    rows = ((row[0], zip(_SAMPLES, row[1:], strict=True)) for row in _ROW.findall(table))
+    rows = ((row[0], zip(_SAMPLES, row[1:], strict=True)) for row in _ROW.findall(generated(page, "accuracy")))
     return {stage: {count: float(told) for count, told in row if told != "not run"} for stage, row in rows}
 
 
@@ -43,7 +43,7 @@ def accuracy_plot(errors: Errors) -> str:
         f'<polyline class="front" points="{fair}"/>',
         *(_line(stage, row, x, y) for stage, row in errors.items()),
         *(_bound(x.at(count), y.at(bound)) for count, bound in _BOUNDS.items()),
-        *_legend(),
+        *legend(dict(_FAMILIES.values())),
         "</svg>",
     ]
     return "\n".join(lines) + "\n"
@@ -57,13 +57,6 @@ def _line(stage: str, row: Mapping[int, float], x: Axis, y: Axis) -> str:
 
 def _bound(x: float, y: float) -> str:
     return f'<line x1="{x - 14:.1f}" x2="{x + 14:.1f}" y1="{y:.1f}" y2="{y:.1f}" stroke="#333" stroke-width="2"/>'
-
-
-def _legend() -> Iterator[str]:
-    for row, (name, color) in enumerate(_FAMILIES.values()):
-        at = 66 + 18 * row
-        yield f'<line x1="{WIDTH - 140:.0f}" x2="{WIDTH - 120:.0f}" y1="{at}" y2="{at}" stroke="{color}"/>'
-        yield text(WIDTH - 112, at + 4, name)
 
 
 def main(page: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 
 from defshade_cli.dataclass import dataclass
@@ -57,6 +57,14 @@ def grid(x: Axis, y: Axis) -> Iterator[str]:
         at = y.at(tick)
         yield f'<line class="grid" x1="{x.first}" x2="{x.last}" y1="{at:.1f}" y2="{at:.1f}"/>'
         yield text(x.first - 6, at + 4, f"{tick:g}", "end")
+
+
+def legend(colors: Mapping[str, str]) -> Iterator[str]:
+    """What the lines of each colour are, at the right."""
+    for row, (name, color) in enumerate(colors.items()):
+        at = 66 + 18 * row
+        yield f'<line x1="{WIDTH - 140:.0f}" x2="{WIDTH - 120:.0f}" y1="{at}" y2="{at}" stroke="{color}"/>'
+        yield text(WIDTH - 112, at + 4, name)
 
 
 def text(x: float, y: float, words: str, anchor: str = "start") -> str:

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.measure.accuracy import stages
-from defshade_cli.measure.layouts import first_frame, replace_generated
+from defshade_cli.measure.layouts import first_frame
+from defshade_cli.measure.sections import replace_generated
 from defshade_cli.passes.convergence import Convergence
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan

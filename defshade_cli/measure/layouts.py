@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -15,6 +14,7 @@ from defshade_cli import resources
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.measure.error import RelativeError, relative_error
 from defshade_cli.measure.reference import reference_radiance
+from defshade_cli.measure.sections import replace_generated
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.scene import Scene
@@ -60,17 +60,6 @@ def layout_table(errors: Mapping[str, Mapping[Layout, RelativeError]]) -> str:
         for stage, by_layout in errors.items()
     ]
     return "\n".join([_HEADER, _RULE, *rows])
-
-
-def replace_generated(page: str, name: str, content: str) -> str:
-    """`page` with what stands between `<!-- generated: name -->` and `<!-- end generated -->` replaced.
-
-    Raises ValueError where the page has no such section.
-    """
-    section = re.compile(rf"(<!-- generated: {re.escape(name)} -->\n).*?(<!-- end generated -->)", re.DOTALL)
-    if not section.search(page):
-        raise ValueError(f"no section generated: {name}")
-    return section.sub(lambda match: f"{match[1]}{content}\n{match[2]}", page)
 
 
 def referenced_stages() -> list[Path]:

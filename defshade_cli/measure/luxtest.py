@@ -24,8 +24,8 @@ from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.reading import read
 from defshade_cli.image.transfer import linear
 from defshade_cli.measure.brdf import evaluate_brdf
-from defshade_cli.measure.layouts import replace_generated
 from defshade_cli.measure.reference import surface_from_planes
+from defshade_cli.measure.sections import replace_generated
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.scene import Scene

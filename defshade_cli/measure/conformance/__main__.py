@@ -14,7 +14,7 @@ from defshade_cli.measure.conformance.catalogue import assets_folder, read_items
 from defshade_cli.measure.conformance.page import page_of
 from defshade_cli.measure.conformance.report import report_of, summary_of, tables_of
 from defshade_cli.measure.conformance.results import Result
-from defshade_cli.measure.layouts import replace_generated
+from defshade_cli.measure.sections import replace_generated
 
 WORKERS = 2
 

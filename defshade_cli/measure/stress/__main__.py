@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 
 from defshade_cli.gpu.context import Gpu
-from defshade_cli.measure.layouts import replace_generated
+from defshade_cli.measure.sections import replace_generated
 from defshade_cli.measure.stress.corners import all_corners
 from defshade_cli.measure.stress.table import summary
 from defshade_cli.measure.stress.verdict import judge
