@@ -12,6 +12,8 @@ from pxr import Gf, Usd
 
 from defshade_cli import render
 from defshade_cli.usd.color_space import in_rec709, texture_space
+from defshade_cli.usd.opening.stage import open_stage
+from defshade_cli.usd.reader import StageReader
 from stages import read, stage_of
 
 RED_AP1 = (1.7050504, -0.1302564, -0.0240033)
@@ -86,10 +88,27 @@ def test_curves_are_undone_as_gf_does() -> None:
         ("lin_rec709_scene", "raw"),
         ("srgb_rec709_scene", "sRGB"),
         ("ACEScg", "lin_ap1_scene"),
+        ("acescg", "lin_ap1_scene"),
+        ("sRGB", "sRGB"),
+        ("srgb_texture", "sRGB"),
+        ("linear", "raw"),
+        ("of no such name", "auto"),
     ],
 )
 def test_spaces_of_texture_files(space: str, expected: str) -> None:
     assert texture_space(attribute_in(space).GetPrim().GetAttribute("f")) == expected
+
+
+def test_names_that_nobody_knows_are_told(tmp_path: Path) -> None:
+    oiio.ImageBuf(np.full((4, 4, 3), 0.5, np.float32)).write(str(tmp_path / "flat.exr"))
+    text = QUAD.replace("DIFFUSE", TEXTURED).replace("lin_ap1_scene", "of no name")
+    text = text.replace("intensity = 1", 'intensity = 1\ncolor3f inputs:color = (1, 0, 0) ( colorSpace = "nowhere" )')
+    (tmp_path / "flat.usda").write_text(text)
+    told = {
+        issue.path: issue.reason for issue in StageReader(open_stage(tmp_path / "flat.usda")).read(None).unsupported
+    }
+    assert told["/m"] == "without colour space of no name"
+    assert told["/sun"] == "its color counts as linear Rec.709: there is no colour space nowhere"
 
 
 def test_a_texture_in_another_space(tmp_path: Path) -> None:

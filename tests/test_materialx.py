@@ -140,9 +140,10 @@ def test_images_keep_their_colour_space(tmp_path: Path, name: str, space: str) -
 def test_constants_are_converted_and_unknown_spaces_named(tmp_path: Path) -> None:
     """ACEScg's red by the matrix of the ACES project, (1.705, −0.130, −0.024); colours are no less than 0."""
     red = 'color3f inputs:emission_color = (1, 0, 0) (colorSpace = "{}")\nfloat inputs:emission = 1'
-    found, lost = read(tmp_path, STANDARD, red.format("acescg"))
-    np.testing.assert_allclose(np.maximum(found.emissive_color, 0.0), (1.7050504, 0, 0), atol=1e-4)
-    assert lost == []
+    for name in ("acescg", "lin_ap1_scene"):
+        found, lost = read(tmp_path, STANDARD, red.format(name))
+        np.testing.assert_allclose(np.maximum(found.emissive_color, 0.0), (1.7050504, 0, 0), atol=1e-4)
+        assert lost == []
     found, lost = read(tmp_path, STANDARD, red.format("lin_nowhere"))
     np.testing.assert_allclose(found.emissive_color, (1, 0, 0))
     assert any("colour space lin_nowhere" in reason for reason in lost)

@@ -94,6 +94,20 @@ def test_back_slashes_in_paths_are_slashes(tmp_path: Path, name: str) -> None:
     assert not scene.unsupported
 
 
+@pytest.mark.parametrize("name", ["maps/wood.<UDIM>.png", "maps\\wood.1001.png"])
+def test_paths_start_from_the_layer_that_says_them(tmp_path: Path, name: str) -> None:
+    """A stronger layer in another folder says but a note on the same attribute."""
+    for folder in ("maps", "light"):
+        (tmp_path / folder).mkdir()
+    save(tmp_path / "maps" / "wood.1001.png", noise(3))
+    (tmp_path / "s.usda").write_text(BACK_SLASHES.replace("maps\\NAME", name))
+    note = 'over "m" {\nover "t" {\nasset inputs:file (doc = "as lit")\n}\n}'
+    (tmp_path / "light" / "s.usda").write_text(f"#usda 1.0\n(subLayers = [@../s.usda@])\n{note}\n")
+    scene = StageReader(open_stage(tmp_path / "light" / "s.usda")).read(None)
+    assert [Path(tile.path).name for texture in scene.textures for _, tile in texture.tiles] == ["wood.1001.png"]
+    assert not scene.unsupported
+
+
 def test_a_missing_and_a_broken_file_are_logged_and_left_out(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     (tmp_path / "broken.png").write_bytes(b"no image")
     sources = [Source(ImageFile(str(tmp_path / name)), "auto") for name in ("missing.png", "broken.png")]

@@ -20,7 +20,7 @@ from defshade_cli.scene.scene import Unsupported
 from defshade_cli.scene.shadow import ShadowStyle
 from defshade_cli.scene.shaping import Shaping
 from defshade_cli.usd.blame import mistyped
-from defshade_cli.usd.color_space import in_rec709
+from defshade_cli.usd.color_space import in_rec709, unknown_space
 from defshade_cli.usd.lights.dome import is_dome, pole, sky_texture
 from defshade_cli.usd.lights.light_files import with_files
 from defshade_cli.usd.lights.mesh_light import Glow, is_mesh_light, read_glow
@@ -154,6 +154,8 @@ def _left_out(prim: Usd.Prim, time: Usd.TimeCode) -> Iterator[str]:
     authored = {attribute.GetName(): attribute for attribute in prim.GetAuthoredAttributes()}
     if connected := [name for name, attribute in authored.items() if attribute.HasAuthoredConnections()]:
         yield f"connections are ignored: {', '.join(connected)}"
+    if space := unknown_space(prim.GetAttribute("inputs:color")):
+        yield f"its color counts as linear Rec.709: there is no colour space {space}"
     inputs = {name: attribute for name, attribute in authored.items() if name.startswith(_INPUTS)}
     if odd := [name for name, attribute in inputs.items() if not is_finite(attribute.Get(time))]:
         yield f"not finite, so the schema's own values count: {', '.join(odd)}"

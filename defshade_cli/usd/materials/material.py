@@ -90,6 +90,7 @@ def read_material(
         reason, left_out = f"lost of {identifier}:", list(translation.lost)
     else:
         return not_understood(shown_as, _surface_named(prim, shader, identifier))
+    left_out.extend(f"colour space {name}" for name in network.unknown_spaces)
     values = sound(read.values, left_out)
     material = Material(shown_as, **values, primvars=read.primvars, inputs=read.textures)
     left_out.extend(f"textures at primvar {name}" for name in material.uv_names[UV_SETS:])

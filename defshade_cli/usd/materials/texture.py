@@ -72,7 +72,10 @@ def read_texture_input(network: Network, output: Usd.Attribute) -> TextureInput:
 def _space(network: Network, node: UsdShade.Shader, file: Usd.Attribute) -> ColorSpace:
     """As the node says; where it leaves it open, as the file's attribute does."""
     said = _one_of(network.value(node, "sourceColorSpace"), STATED_SPACES, "auto")
-    return texture_space(file) if said == "auto" else said
+    if said != "auto":
+        return said
+    network.note_space(file)
+    return texture_space(file)
 
 
 def _of_channel(channel: Channel, value: Any) -> Four:
@@ -126,7 +129,7 @@ def image_tiles(asset: Sdf.AssetPath, attribute: Usd.Attribute) -> tuple[tuple[i
 
     Raises Unreadable where there is none.
     """
-    layer = attribute.GetPropertyStack()[0].layer
+    layer = _layer_of_value(attribute)
     path = asset.path.replace("\\", "/")
     if UsdShade.UdimUtils.IsUdimIdentifier(path):
         found = UsdShade.UdimUtils.ResolveUdimTilePaths(path, layer)
@@ -137,6 +140,13 @@ def image_tiles(asset: Sdf.AssetPath, attribute: Usd.Attribute) -> tuple[tuple[i
     if not tiles:
         raise Unreadable(f"no file {asset.path}")
     return tiles
+
+
+def _layer_of_value(attribute: Usd.Attribute) -> Sdf.Layer:
+    """What relative paths start from: a stronger layer may say another thing of the attribute."""
+    specs = attribute.GetPropertyStack()
+    valued = (spec for spec in specs if spec.HasInfo("default") or spec.HasInfo("timeSamples"))
+    return next(valued, specs[0]).layer
 
 
 def _resolved(layer: Sdf.Layer, path: str) -> str:

@@ -11,7 +11,6 @@ import numpy as np
 from pxr import Usd, UsdShade
 
 from defshade_cli.dataclass import dataclass
-from defshade_cli.usd.materials.materialx.color_spaces import linearised
 from defshade_cli.usd.materials.materialx.signal import NonLinear, Signal, Values, constant
 from defshade_cli.usd.materials.network import Network, computed, node_of
 
@@ -46,7 +45,7 @@ class Graph:
         if source is not None and computed(source):
             return self.output(source)
         value = None if source is None else self.network.of(source)
-        return constant(default if value is None else linearised(source, _numbers(value), self.lost))
+        return constant(default if value is None else _numbers(value))
 
     def values(self, node: UsdShade.Shader, name: str, default: Any) -> Values:
         """What reaches an input that has to be constant. Raises Unread where it is not."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from pxr import Sdf, UsdShade
+from pxr import Sdf, Usd, UsdShade
 
 from defshade_cli.scene.texture import STATED_SPACES, ColorSpace, Texture, Wrap
-from defshade_cli.usd.materials.materialx.color_spaces import color_space
+from defshade_cli.usd.color_space import is_known, texture_space_of
 from defshade_cli.usd.materials.materialx.coordinates import Coordinates, gltf_placed, read_coordinates, tiled
 from defshade_cli.usd.materials.materialx.graph import Graph
 from defshade_cli.usd.materials.materialx.signal import Lookup, Signal, constant, texel
@@ -96,7 +96,7 @@ def _read(
     texture = Texture(
         tiles,
         udim=UsdShade.UdimUtils.IsUdimIdentifier(asset.path),
-        color_space=_stated(graph, node) or color_space(attribute, graph.lost),
+        color_space=_stated(graph, node) or _space(graph, attribute),
         wrap_s=_wrap(graph, node, names.u),
         wrap_t=_wrap(graph, node, names.v),
     )
@@ -107,6 +107,13 @@ def _stated(graph: Graph, node: UsdShade.Shader) -> ColorSpace:
     """As UsdUVTexture says it outside MaterialX, of which exporters leave it on the node; empty for nothing."""
     said = graph.text(node, "sourceColorSpace", "")
     return said if said in STATED_SPACES else ""
+
+
+def _space(graph: Graph, file: Usd.Attribute) -> ColorSpace:
+    """As the file's attribute says; MaterialX takes texels for linear where nothing does."""
+    graph.network.note_space(file)
+    name = str(file.GetColorSpace()) if file.HasColorSpace() else ""
+    return texture_space_of(name) if name and is_known(name) else "raw"
 
 
 def _wrap(graph: Graph, node: UsdShade.Shader, name: str) -> Wrap:
