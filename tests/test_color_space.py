@@ -99,6 +99,20 @@ def test_spaces_of_texture_files(space: str, expected: str) -> None:
     assert texture_space(attribute_in(space).GetPrim().GetAttribute("f")) == expected
 
 
+@pytest.mark.parametrize(
+    ("said", "expected", "told"),
+    [("srgb_texture", "sRGB", []), ("Linear", "auto", ["without colour space Linear"]), ("", "auto", [])],
+)
+def test_a_node_may_say_any_space(tmp_path: Path, said: str, expected: str, told: list[str]) -> None:
+    """Over what is said of its file."""
+    oiio.ImageBuf(np.full((4, 4, 3), 0.5, np.float32)).write(str(tmp_path / "flat.exr"))
+    textured = TEXTURED.replace('( colorSpace = "lin_ap1_scene" )', f'\ntoken inputs:sourceColorSpace = "{said}"')
+    (tmp_path / "flat.usda").write_text(QUAD.replace("DIFFUSE", textured))
+    scene = StageReader(open_stage(tmp_path / "flat.usda")).read(None)
+    assert [texture.color_space for texture in scene.textures] == [expected]
+    assert [issue.reason for issue in scene.unsupported] == told
+
+
 def test_names_that_nobody_knows_are_told(tmp_path: Path) -> None:
     oiio.ImageBuf(np.full((4, 4, 3), 0.5, np.float32)).write(str(tmp_path / "flat.exr"))
     text = QUAD.replace("DIFFUSE", TEXTURED).replace("lin_ap1_scene", "of no name")

@@ -293,3 +293,21 @@ def test_what_value_clips_alone_say_counts(tmp_path: Path) -> None:
     reader = StageReader(open_stage(tmp_path / "shot.usda"))
     sizes = [np.ptp(reader.read(frame).meshes[1].points) for frame in (0.0, 5.0)]
     assert sizes == [1.0, 2.0] and names(reader.read(9.0)) == {"/stays"}
+
+
+def test_clips_alone_colour_a_mesh_that_moves(tmp_path: Path) -> None:
+    """USD does not list such a primvar among those of the prim."""
+    mesh = """def Mesh "blinks" (CLIPS) {
+        int[] faceVertexCounts = [3]
+        int[] faceVertexIndices = [0, 1, 2]
+    }"""
+    values = """over "blinks" {
+        color3f[] primvars:displayColor.timeSamples = { 0: [(1, 0, 0)], 10: [(0, 0, 1)] }
+        point3f[] points.timeSamples = { 0: [(0, 0, 0), (1, 0, 0), (0, 1, 0)], 10: [(0, 0, 1), (1, 0, 0), (0, 1, 0)] }
+    }"""
+    manifest = 'over "blinks" {\ncolor3f[] primvars:displayColor\npoint3f[] points\n}'
+    clips = CLIPPED[CLIPPED.index("clips = ") : CLIPPED.rindex(")")]
+    for name, text in (("clip", values), ("manifest", manifest), ("shot", mesh.replace("CLIPS", clips))):
+        (tmp_path / f"{name}.usda").write_text(f"#usda 1.0\n{text}\n")
+    (drawable,) = StageReader(open_stage(tmp_path / "shot.usda")).read(5.0).drawables
+    np.testing.assert_allclose(drawable.display_color, [(0.5, 0, 0.5)])

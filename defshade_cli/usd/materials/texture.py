@@ -11,7 +11,6 @@ from pxr import Ar, Sdf, Usd, UsdShade
 from defshade_cli.scene.texture import (
     FIRST_UDIM,
     IDENTITY,
-    STATED_SPACES,
     Affine,
     Channel,
     ColorSpace,
@@ -21,7 +20,7 @@ from defshade_cli.scene.texture import (
     TextureInput,
     Wrap,
 )
-from defshade_cli.usd.color_space import texture_space
+from defshade_cli.usd.color_space import is_known, texture_space, texture_space_of
 from defshade_cli.usd.materials.network import Network, computed, node_of
 from defshade_cli.usd.values import is_finite, resembles
 
@@ -71,9 +70,11 @@ def read_texture_input(network: Network, output: Usd.Attribute) -> TextureInput:
 
 def _space(network: Network, node: UsdShade.Shader, file: Usd.Attribute) -> ColorSpace:
     """As the node says; where it leaves it open, as the file's attribute does."""
-    said = _one_of(network.value(node, "sourceColorSpace"), STATED_SPACES, "auto")
+    said = str(network.value(node, "sourceColorSpace") or "auto")
+    if said != "auto" and is_known(said):
+        return texture_space_of(said)
     if said != "auto":
-        return said
+        network.unknown_spaces[said] = None
     network.note_space(file)
     return texture_space(file)
 

@@ -81,8 +81,14 @@ def find_display(prim: Usd.Prim, name: str) -> UsdGeom.Primvar:
 
 
 def find_primvars(prim: Usd.Prim) -> dict[str, UsdGeom.Primvar]:
-    """What lies on a surface, by name: its own primvars with a value, and constant ones of its ancestors."""
-    return {str(p.GetPrimvarName()): p for p in UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance()}
+    """What lies on a surface, by name: its own primvars with a value, and constant ones of its ancestors.
+
+    USD does not list those that the schema has and value clips alone give values.
+    """
+    api = UsdGeom.PrimvarsAPI(prim)
+    found = {str(p.GetPrimvarName()): p for p in api.FindPrimvarsWithInheritance()}
+    own = {name: api.GetPrimvar(name) for name in (DISPLAY_COLOR, "displayOpacity") if name not in found}
+    return found | {name: primvar for name, primvar in own.items() if primvar and primvar.HasValue()}
 
 
 def uv_width(attribute: UsdGeom.Primvar | Usd.Attribute) -> int:
