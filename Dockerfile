@@ -4,7 +4,8 @@ FROM debian:stable-slim AS build
 RUN apt-get update && apt-get install --yes --no-install-recommends make python3 python3-venv
 WORKDIR /src
 COPY . .
-RUN make wheel && python3 -m venv /opt/defshade && /opt/defshade/bin/pip install --no-cache-dir dist/*.whl
+RUN make wheel && python3 -m venv /opt/defshade \
+    && /opt/defshade/bin/pip install --no-cache-dir "$(ls dist/*.whl)[meshoptimizer]"
 
 FROM debian:stable-slim
 RUN apt-get update \

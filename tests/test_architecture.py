@@ -41,6 +41,7 @@ FOREIGN = {
     "OpenImageIO": ("image",),
     "PyOpenColorIO": ("image",),
     "distributed": ("farm",),
+    "meshoptimizer": ("scene",),
     "click": ("cli",),
     "rich": ("cli",),
     "mitsuba": ("measure",),

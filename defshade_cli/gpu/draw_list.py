@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.dataclass import dataclass
+from defshade_cli.gpu.coarse_casters import CoarseCasters
 from defshade_cli.gpu.textures import TextureSet
 from defshade_cli.gpu.vertex_pool import first_rows
 from defshade_cli.scene.geometry import Drawable, Mesh, box_corners
@@ -29,6 +30,7 @@ class DrawList:
     table: (C,) indirect commands, one draw a subset, instanced.  thin: (C,) whose materials may let something through.
     fronts: (C,) of what is closed: 1 where fronts are counter-clockwise, −1 where its placements mirror them; else 0.
     corners: (C, 8, 3) of a box around what each command draws, relative to the eye; not finite where nothing is known.
+    coarse: what coarser triangles may stand for in shadow maps.
     many_uvs: vertices hold UV_SETS sets of texture coordinates, not FEW_UV_SETS.
     """
 
@@ -40,6 +42,7 @@ class DrawList:
     corners: NDArray[np.float64]
     color_varies: bool
     textures: TextureSet
+    coarse: CoarseCasters
     many_uvs: bool
 
     def vertices_of(self, program: moderngl.Program) -> list[tuple[Any, ...]]:

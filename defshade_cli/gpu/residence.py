@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from defshade_cli.gpu.buffers import INSTANCES, MATERIALS, TEXTURE_INPUTS, TILES, RecordBuffer, replaced
+from defshade_cli.gpu.coarse_casters import CoarseCasters, CoarseTriangles
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.gpu.draw_list import DrawList, command_corners, draw_commands, fronts_of
 from defshade_cli.gpu.scene_records import instance_records, material_records
@@ -32,6 +33,7 @@ class GpuScene:
         self._texture_inputs = RecordBuffer(gpu, TEXTURE_INPUTS)
         self._tiles = RecordBuffer(gpu, TILES)
         self._textures, self._pool = TextureStore(gpu), VertexPool(gpu)
+        self._coarse = CoarseTriangles(gpu)
         self._rows: list[moderngl.Buffer] = []
         self._moved: list[moderngl.Buffer] = []
 
@@ -44,6 +46,7 @@ class GpuScene:
         texels: Mapping[Texture, float] = NO_TEXELS,
         thin: Sequence[int] = (),
         closed: Sequence[int] = (),
+        coarse: Sequence[int] = (),
     ) -> DrawList:
         """Make the scene's geometry, placements and materials resident, relative to its camera.
 
@@ -53,6 +56,7 @@ class GpuScene:
         texels: a side that textures are worth; those that it does not name are read whole.
         thin: numbers of the materials that may let something through.
         closed: numbers of the drawables of which maps need the fronts alone.
+        coarse: numbers of those that coarser triangles may stand for in maps.
         """
         instances = instance_records(scene.drawables, scene.camera.position)
         self._instances.write(instances)
@@ -76,6 +80,7 @@ class GpuScene:
             command_corners(scene),
             color_varies=varying.color_varies,
             textures=textures,
+            coarse=CoarseCasters.of_scene(scene, coarse, self._coarse),
             many_uvs=varying.uv_sets > FEW_UV_SETS,
         )
 

@@ -41,11 +41,17 @@ class Geometry:
 
             self._motions.write(motion_records(scene, plan))
             moved = tuple(neighbouring_points(scene))
-        return self._scene.update(scene, plan.inputs, moved, plan.primvars, plan.texels, plan.thin, plan.closed)
+        return self._update(scene, plan, moved, plan.primvars)
 
     def update_to_moment(self, scene: Scene, plan: Plan) -> DrawList:
         """The same at another time of the shutter, which data layers do not show."""
-        return self._scene.update(scene, plan.inputs, texels=plan.texels, thin=plan.thin, closed=plan.closed)
+        return self._update(scene, plan)
+
+    def _update(
+        self, scene: Scene, plan: Plan, moved: tuple[NDArray[np.float32], ...] = (), primvars: tuple[str, ...] = ()
+    ) -> DrawList:
+        chosen = {"thin": plan.thin, "closed": plan.closed, "coarse": plan.coarse}
+        return self._scene.update(scene, plan.inputs, moved, primvars, plan.texels, **chosen)
 
     def look(self, plan: Plan, layout: Layout, sample: Sample = CENTRE) -> NDArray[Any]:
         """Bind the View (1,) of a sample, and return it."""

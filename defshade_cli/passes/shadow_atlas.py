@@ -161,10 +161,20 @@ def _atlas_from_clip(x: int, y: int, resolution: int) -> Matrix:
     return matrix
 
 
+def deeper_from_relative(camera: Camera, resolution: int, texels: float) -> Matrix:
+    """(4, 4) what draws a map of things that are farther from the light by some of its texels' lesser sides."""
+    left, right, bottom, top = camera.window
+    return _nearer_by(camera, -texels * min(right - left, top - bottom) / resolution) @ camera.camera_from_world
+
+
 def _nearer(camera: Camera, resolution: int) -> Matrix:
     """The projection of receivers, nearer to the light than they are."""
-    matrix = _projection(camera)
     left, right, bottom, top = camera.window
-    step = _TOWARDS_LIGHT * max(right - left, top - bottom) / resolution
+    return _nearer_by(camera, _TOWARDS_LIGHT * max(right - left, top - bottom) / resolution)
+
+
+def _nearer_by(camera: Camera, step: float) -> Matrix:
+    """The projection of what is nearer by a step; where the view widens, by as much a unit ahead."""
+    matrix = _projection(camera)
     matrix[2, 3] += step * (matrix[2, 3] if camera.projection == "perspective" else matrix[2, 2])
     return matrix

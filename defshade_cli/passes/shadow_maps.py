@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.context import Gpu
+from defshade_cli.gpu.draw_list import DrawList
 from defshade_cli.gpu.targets import Part
+from defshade_cli.passes.coarse_maps import coarse_levels
 from defshade_cli.passes.culling import clip_of_part
 from defshade_cli.passes.emitters import LitSample
 from defshade_cli.passes.linking import ALL_LINKED
@@ -19,6 +21,7 @@ from defshade_cli.passes.shadow_atlas import (
     ShadowAtlas,
     clip_from_relative,
     cube_uniforms,
+    deeper_from_relative,
     map_records,
     placed,
     taken,
@@ -40,6 +43,7 @@ class MapRequest:
     resolution: texels along a map's side.  jitter: in texels.
     casters: of each light, the place of its casters' link bits; all cast where none are given.
     number: of the atlas.
+    coarse_share: of a texel, that coarser casters may be off; none are where it is 0.
     """
 
     cameras: Sequence[tuple[Camera, ...]]
@@ -47,6 +51,7 @@ class MapRequest:
     jitter: tuple[float, float] = (0.0, 0.0)
     casters: Sequence[int] = ()
     number: int = 0
+    coarse_share: float = 0.0
 
     @classmethod
     def of(cls, batch: Sequence[LitSample], plan: Plan, sample: Sample, tables: LightTables, number: int) -> MapRequest:
@@ -57,6 +62,7 @@ class MapRequest:
             sample.texel_offset,
             [tables.links.casts.get(lit.planned.light, ALL_LINKED) for lit in batch],
             number if plan.keeps_maps else 0,
+            plan.coarse_share,
         )
 
     @property
@@ -67,27 +73,37 @@ class MapRequest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Maps:
-    """The maps of an atlas, slot by slot.  clips: (4, 4) each, transposed.  casters: empty where all cast."""
+    """The maps of an atlas, slot by slot.
+
+    clips: (4, 4) each, transposed.  deeper: the same for coarser casters.  casters: empty where all cast.
+    coarse_share: as in MapRequest.  levels: (M, D) how coarse each map takes its coarser casters.
+    """
 
     cameras: Sequence[Camera]
     clips: Sequence[NDArray[np.float32]]
+    deeper: Sequence[NDArray[np.float32]]
     casters: NDArray[Any]
     resolution: int
+    coarse_share: float
+    levels: NDArray[np.float64]
 
     @classmethod
-    def of(cls, request: MapRequest) -> Maps:
+    def of(cls, request: MapRequest, draws: DrawList) -> Maps:
         """What a request asks for."""
-        cameras = placed(request.cameras, request.resolution, request.jitter)
+        side, share = request.resolution, request.coarse_share
+        cameras = placed(request.cameras, side, request.jitter)
         clips = [clip_from_relative(camera).T.astype(np.float32) for camera in cameras]
+        deeper = [deeper_from_relative(camera, side, share).T.astype(np.float32) for camera in cameras]
         casters = np.repeat(request.casters, request.count) if len(request.casters) else np.array([])
-        return cls(cameras, clips, casters, request.resolution)
+        return cls(cameras, clips, deeper, casters, side, share, coarse_levels(draws, cameras, side, share))
 
     def are_alike(self, others: Maps | None) -> bool:
         """Do they see the same geometry alike?"""
         if others is None or (self.resolution, len(self.clips)) != (others.resolution, len(others.clips)):
             return False
         alike = all(np.array_equal(a, b) for a, b in zip(self.clips, others.clips, strict=True))
-        return alike and np.array_equal(self.casters, others.casters)
+        as_coarse = np.array_equal(self.levels, others.levels)
+        return alike and as_coarse and np.array_equal(self.casters, others.casters)
 
     def clip_of(self, slot: int, region: Region | None) -> NDArray[np.floating]:
         """(4, 4), transposed: what sees a part of a map, or all of it."""

@@ -5,6 +5,7 @@ Maps are moved by a fraction of a texel every sample, so that their grid average
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -21,6 +22,7 @@ from defshade_cli.gpu.draw_list import CASTER_FRONTS, DrawList
 from defshade_cli.gpu.render_space import space_defines
 from defshade_cli.gpu.textures import textures_source
 from defshade_cli.image.render_space import REC709, RenderSpace
+from defshade_cli.passes.coarse_maps import divided_runs
 from defshade_cli.passes.culling import CommandBuffer, is_clear_of, may_see
 from defshade_cli.passes.shadow_atlas import ShadowAtlas, places_from_relative
 from defshade_cli.passes.shadow_changes import MapChange, Region, map_change, window_of
@@ -30,6 +32,9 @@ from defshade_cli.scene.camera import Camera
 
 _DEPTH_OFFSET = (0.0, -1.0)
 """Of what a map stores, in slopes a texel and in steps of depth: lib/shadow.glsl follows slopes itself."""
+
+_COARSE_SLOPES = math.sqrt(2.0)
+"""Of coarser casters, for each texel that they may be off; a driver takes the greater of both axes' slopes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +70,15 @@ class ShadowVariant:
         return (["CUTOUT", *read] if self.cutout else []) + ["LINKS"] * self.linked
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Turn:
+    """What maps draw together.  fronts: one of CASTER_FRONTS.  coarse: of coarser casters."""
+
+    program: moderngl.Program
+    fronts: int
+    coarse: bool = False
+
+
 class ShadowPass:
     """Draws shadow maps into atlases; what one call draws the next of the same number overwrites."""
 
@@ -77,14 +91,15 @@ class ShadowPass:
             for kind in kinds
         ]
         solid, *thin = programs
-        self._turns = [(solid, fronts) for fronts in CASTER_FRONTS] + [(program, 0) for program in thin]
+        self._turns = [_Turn(solid, fronts, coarse) for coarse in (True, False) for fronts in CASTER_FRONTS]
+        self._turns += [_Turn(program, 0) for program in thin]
         self._targets = cache(lambda number: MapTarget(gpu))
         self._records = RecordBuffer(gpu, SHADOW_BLOCK, uniform=True)
         self._commands = CommandBuffer(gpu)
 
     def draw(self, draws: DrawList, request: MapRequest) -> ShadowAtlas:
         """All that is asked for."""
-        target, maps = self._targets(request.number), Maps.of(request)
+        target, maps = self._targets(request.number), Maps.of(request, draws)
         target.begin(maps)
         self._draw_maps(draws, target, maps, dict.fromkeys(range(len(maps.cameras))))
         return shadow_atlas(target, request)
@@ -96,7 +111,7 @@ class ShadowPass:
 
         None where the atlas holds others.
         """
-        target, maps, side = self._targets(request.number), Maps.of(request), request.resolution
+        target, maps, side = self._targets(request.number), Maps.of(request, draws), request.resolution
         if not maps.are_alike(target.maps):
             return None
         places = [places_from_relative(camera, side) for camera in maps.cameras]
@@ -122,38 +137,50 @@ class ShadowPass:
         """Parts of maps, or all of them, with the commands that they may see, those first that let nothing through."""
         if not parts:
             return
-        runs = [self._runs(draws, maps, slot, part) for slot, part in parts.items()]
+        places = draws.coarse.places(maps.levels)
+        runs = [self._runs(draws, maps, slot, part, places[slot]) for slot, part in parts.items()]
         self._commands.write([run for each in runs for run in each])
         self._context.depth_func = ">"
-        self._context.polygon_offset = _DEPTH_OFFSET
-        for turn, (program, fronts) in enumerate(self._turns):
-            self._show(fronts)
-            array = self._context.vertex_array(program, draws.vertices_of(program), draws.indices)
-            for number, (slot, part) in enumerate(parts.items()):
-                run = number * len(self._turns) + turn
-                if not self._commands.is_empty(run):
-                    target.keep_to(slot, part)
-                    _set_map(program, maps, slot)
-                    self._commands.render(array, run)
-            array.release()
+        for number, turn in enumerate(self._turns):
+            used = {slot: run for run, slot in enumerate(parts) if not self._commands.is_empty(self._run(run, number))}
+            if used:
+                self._show(turn, maps)
+                indices = draws.coarse.triangles.indices if turn.coarse else draws.indices
+                array = self._context.vertex_array(turn.program, draws.vertices_of(turn.program), indices)
+                for slot, run in used.items():
+                    target.keep_to(slot, parts[slot])
+                    _set_map(turn, maps, slot)
+                    self._commands.render(array, self._run(run, number))
+                array.release()
         target.keep_to(0, None)
         self._context.polygon_offset = 0.0, 0.0
 
-    def _runs(self, draws: DrawList, maps: Maps, slot: int, part: Region | None) -> list[NDArray[Any]]:
-        """What a map, or a part of it, may see in each turn."""
+    def _run(self, number: int, turn: int) -> int:
+        """Of the commands, that the number-th map draws in a turn."""
+        return number * len(self._turns) + turn
+
+    def _runs(
+        self, draws: DrawList, maps: Maps, slot: int, part: Region | None, places: NDArray[np.intp]
+    ) -> list[NDArray[Any]]:
+        """What a map, or a part of it, may see in each turn. places: of its coarser casters."""
         closed, fronts = np.flatnonzero(draws.fronts), np.zeros_like(draws.fronts)
         clear = closed[is_clear_of(maps.cameras[slot], draws.corners[closed])]
         fronts[clear] = draws.fronts[clear]
-        return draws.caster_runs(may_see(maps.clip_of(slot, part), draws.corners), fronts)[: len(self._turns)]
+        seen = may_see(maps.clip_of(slot, part), draws.corners)
+        whole, coarse = divided_runs(draws, places, seen, fronts)
+        return [*coarse, *draws.caster_runs(whole, fronts)][: len(self._turns)]
 
-    def _show(self, fronts: int) -> None:
+    def _show(self, turn: _Turn, maps: Maps) -> None:
         """Both sides of all faces, or those alone that are fronts: see DrawList.fronts."""
-        self._context.enable_only(moderngl.DEPTH_TEST | (moderngl.CULL_FACE if fronts else moderngl.NOTHING))
-        self._context.cull_face = "front" if fronts < 0 else "back"
+        self._context.enable_only(moderngl.DEPTH_TEST | (moderngl.CULL_FACE if turn.fronts else moderngl.NOTHING))
+        self._context.cull_face = "front" if turn.fronts < 0 else "back"
+        slopes, steps = _DEPTH_OFFSET
+        self._context.polygon_offset = slopes - _COARSE_SLOPES * maps.coarse_share * turn.coarse, steps
 
 
-def _set_map(program: moderngl.Program, maps: Maps, slot: int) -> None:
-    program["clip_from_relative"] = tuple(maps.clips[slot].ravel().tolist())
+def _set_map(turn: _Turn, maps: Maps, slot: int) -> None:
+    program, clips = turn.program, maps.deeper if turn.coarse else maps.clips
+    program["clip_from_relative"] = tuple(clips[slot].ravel().tolist())
     if "towards_light" in program:
         program["towards_light"] = _towards(maps.cameras[slot])
     if "first_caster" in program:

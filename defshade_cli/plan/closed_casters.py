@@ -6,7 +6,7 @@ a mesh that is inside out there may be backs alone.
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterator, Sequence
 
 from defshade_cli.plan.lights import PlannedLight
 from defshade_cli.scene.geometry import Drawable, Mesh
@@ -26,15 +26,18 @@ def closed_casters(scene: Scene, lights: Sequence[PlannedLight], samples: int, t
     maps = samples * sum(planned.points for planned in lights if planned.light.casts_shadow)
     if maps < _LEAST_MAPS:
         return ()
+    return tuple(n for n in large_casters(scene, thin) if scene.meshes[scene.drawables[n].mesh].is_closed)
+
+
+def large_casters(scene: Scene, thin: Container[int]) -> Iterator[int]:
+    """Numbers of drawables of many triangles, all of which are drawn and let nothing through."""
     passing = [material.one_sided or number in thin for number, material in enumerate(scene.materials)]
-    return tuple(
-        number
-        for number, drawable in enumerate(scene.drawables)
-        if not any(passing[subset.material] for subset in drawable.subsets)
-        and _is_whole(drawable, scene.meshes[drawable.mesh])
-    )
+    for number, drawable in enumerate(scene.drawables):
+        lets_through = any(passing[subset.material] for subset in drawable.subsets)
+        if not lets_through and _is_whole(drawable, scene.meshes[drawable.mesh]):
+            yield number
 
 
 def _is_whole(drawable: Drawable, mesh: Mesh) -> bool:
     count = sum(subset.count for subset in drawable.subsets)
-    return _LEAST_TRIANGLES <= count == len(mesh.triangles) and mesh.is_closed
+    return _LEAST_TRIANGLES <= count == len(mesh.triangles)

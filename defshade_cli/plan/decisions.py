@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from defshade_cli.dataclass import dataclass
 from defshade_cli.gpu.planes import PLANES
 from defshade_cli.plan.cost import covered_share
+from defshade_cli.scene.coarse import INSTALL, can_be_coarse
 
 if TYPE_CHECKING:
     from defshade_cli.plan.plan import Plan
@@ -62,6 +63,7 @@ def _of_shadows(plan: Plan) -> Iterator[Decision]:
         yield Decision("a dome's shadows", "shared", f"by {plan.sharing_pixels} pixels, each of which looks up some")
     if plan.shadows:
         yield _explain_backs(plan)
+        yield _explain_coarse(plan)
     yield _kept("IES profiles", bool(plan.profiles), "a light is shaped by one", "no light has one")
     yield _kept("shadow linking", plan.shadow_linked, "a light chooses its casters", "everything casts shadows")
 
@@ -104,6 +106,13 @@ def _explain_backs(plan: Plan) -> Decision:
     if not plan.closed:
         return Decision("backs of casters", "drawn", "no large closed mesh, or few maps")
     return Decision("backs of casters", f"skipped of {len(plan.closed)}", "closed meshes, whose fronts shade alike")
+
+
+def _explain_coarse(plan: Plan) -> Decision:
+    if plan.coarse:
+        off = f"off by about 1/{1.0 / plan.coarse_share:.0f} of a map's texel, where that saves triangles"
+        return Decision("coarser casters", f"{len(plan.coarse)} in shadow maps", off)
+    return Decision("coarser casters", "none", "no large solid mesh, or few maps" if can_be_coarse() else INSTALL)
 
 
 def _explain_rays(plan: Plan) -> Decision:

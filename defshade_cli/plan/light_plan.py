@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from defshade_cli.dataclass import dataclass
+from defshade_cli.plan.coarse_casters import coarse_share
 from defshade_cli.plan.lights import PlannedLight
 from defshade_cli.plan.shadow_maps import ATLAS, MOST_KEPT, count_maps, shadow_resolution
 from defshade_cli.scene.light import DomeLight
@@ -28,6 +29,7 @@ class LightPlan:
     portals: how many hints for sampling domes the stage has.
     thin: numbers of the materials whose opacity may be below 1.
     closed: numbers of the drawables that show shadow maps their fronts alone.
+    coarse: numbers of those that coarser triangles may stand for in shadow maps.
     """
 
     samples: int
@@ -41,6 +43,7 @@ class LightPlan:
     portals: int
     thin: tuple[int, ...]
     closed: tuple[int, ...]
+    coarse: tuple[int, ...]
 
     @property
     def cutout(self) -> bool:
@@ -98,6 +101,11 @@ class LightPlan:
     def shadow_resolution(self) -> int:
         """Texels along the side of each shadow map."""
         return shadow_resolution(self.lights, self.samples, thin=self.cutout)
+
+    @property
+    def coarse_share(self) -> float:
+        """Of a shadow map's texel, that coarser triangles may be off."""
+        return coarse_share(self.samples)
 
     @property
     def maps_a_sample(self) -> int:

@@ -13,6 +13,7 @@ from defshade_cli.image.ocio import find_render_space
 from defshade_cli.plan.bounds import SLACK
 from defshade_cli.plan.changes import find_redrawing
 from defshade_cli.plan.closed_casters import closed_casters
+from defshade_cli.plan.coarse_casters import coarse_casters
 from defshade_cli.plan.cost import choose_lighting
 from defshade_cli.plan.lights import PlannedLight, plan_lights
 from defshade_cli.plan.lobe_rays import roughest_rays, seen_by_rays
@@ -48,6 +49,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
     thin_ones = thin_numbers(scene, thin)
     if is_lit(layers):
         lights = seen_by_rays(lights, scene, settings, thin=bool(thin))
+    moments = count_moments(scene, settings)
     planes, data_planes, data_pass = divide_planes(scene, settings, layers, thin)
     shadows = settings.shadows and bool(scene.drawables) and any(p.light.casts_shadow for p in lights)
     return Plan(
@@ -64,7 +66,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         cell_parts=cell_parts(settings),
         max_error=settings.max_error,
         time_limit=settings.time_limit,
-        moments=count_moments(scene, settings),
+        moments=moments,
         filter=settings.filter,
         filter_width=settings.filter_width or FILTERS[settings.filter],
         layers=layers,
@@ -79,6 +81,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         background=settings.background,
         thin=thin_ones,
         closed=closed_casters(scene, lights, settings.most_samples, thin_ones) if shadows else (),
+        coarse=coarse_casters(scene, lights, settings.most_samples, moments, thin_ones) if shadows else (),
         solid=len(solid),
         transparent=is_transparent(thin, settings.shading),
         texels=seen_texels(scene, View(display_camera, display[1])),

@@ -27,6 +27,15 @@ def is_closed(points: NDArray[np.float32], triangles: NDArray[np.uint32]) -> boo
     return not sum(_left_over(first[block], second[block]) for block in blocks) % 2**64
 
 
+def first_of_equal(points: NDArray[np.float32]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """(N,) numbers of the first of the points (V, 3) at each place, and (V,) which of those places each point has.
+
+    Places that part are told apart but by a chance of V² 2⁻⁶⁵.
+    """
+    _, first, of = np.unique(_numbers(points)[0], return_index=True, return_inverse=True)
+    return first, of
+
+
 def _left_over(a: Numbers, b: Numbers) -> int:
     """Of the edges of triangles, by the numbers (3, N) of their corners."""
     following = [1, 2, 0]
