@@ -63,6 +63,8 @@ class Convergence:
     def sample_count(self) -> NDArray[np.int32]:
         """(height, width, 1) samples that each pixel got."""
         width, height = self._size
+        if self.samples.min() == self.samples.max():
+            return np.broadcast_to(self.samples[0, 0], (height, width, 1))
         return self.samples.repeat(TILE, 0)[:height].repeat(TILE, 1)[:, :width, None]
 
     def _tile_means(self, values: NDArray[np.float32]) -> NDArray[np.float64]:

@@ -66,7 +66,9 @@ class Stopping:
         counts = self._convergence.sample_count()
         error = self._convergence.estimate
         known = error if math.isfinite(error) else None
-        sampling = Sampling(int(counts.min()), float(counts.mean()), int(counts.max()), known, self._stopped_by)
+        least, most = int(self._convergence.samples.min()), int(self._convergence.samples.max())
+        mean = float(counts.mean()) if least < most else float(most)
+        sampling = Sampling(least, mean, most, known, self._stopped_by)
         return sampling, counts, self._variance
 
     def _judge(self, samples: int) -> None:
