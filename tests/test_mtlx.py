@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pxr import Sdf
 
 from defshade_cli.scene.scene import Scene
 from defshade_cli.usd.opening.dependencies import read_dependencies
@@ -74,6 +75,29 @@ def test_a_document_is_read_in_place_of_its_reference(
     assert Path(texture.tiles[0][1].path) == (tmp_path / maps / "wood.png").resolve()
     assert (texture.color_space, found.roughness) == ("sRGB", 0.75)
     np.testing.assert_allclose(found.emissive_color, 0.21404, atol=1e-5)
+
+
+def test_documents_in_packages_name_what_lies_beside_them(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """In one package, and in one that lies in another."""
+    pytest.importorskip("MaterialX")
+    with_document(tmp_path)
+    names = ("stage.usda", "look.mtlx", "maps/wood.png")
+    (tmp_path / "maps" / "wood.png").write_bytes(b"texels")
+    pack(tmp_path / "inner.usdz", {name: tmp_path / name for name in names})
+    (tmp_path / "outer.usda").write_text("#usda 1.0\n(\nsubLayers = [@./inner.usdz@]\n)\n")
+    pack(tmp_path / "outer.usdz", {name: tmp_path / name for name in ("outer.usda", "inner.usdz")})
+    for path in (tmp_path / "inner.usdz", tmp_path / "outer.usdz"):
+        scene = read_stage(path)
+        (found,) = scene.materials
+        assert (scene.unsupported, caplog.text) == ((), "")
+        assert found.inputs["diffuse_color"].texture.tiles[0][1].contents == b"texels"
+
+
+def pack(path: Path, files: Mapping[str, Path]) -> None:
+    writer = Sdf.ZipFileWriter.CreateNew(str(path))
+    for name, file in files.items():
+        writer.AddFile(str(file), name)
+    writer.Save()
 
 
 def test_a_document_may_be_a_sublayer(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -6,6 +6,8 @@ by what they resolve to, since the layer has no place of its own.
 
 from __future__ import annotations
 
+from pathlib import PurePosixPath
+from posixpath import normpath
 from typing import TYPE_CHECKING, Any
 
 from pxr import Ar, Sdf, Tf, UsdShade
@@ -235,4 +237,9 @@ def _tiles(image: str) -> list[str]:
 
 
 def _anchored(name: str, resolved: str) -> str:
-    return str(Ar.GetResolver().CreateIdentifier(name.replace("\\", "/"), Ar.ResolvedPath(resolved)))
+    """A path from the document on; Ar knows none inside packages, where it is in the document's own."""
+    name = name.replace("\\", "/")
+    if not Ar.IsPackageRelativePath(resolved) or PurePosixPath(name).is_absolute():
+        return str(Ar.GetResolver().CreateIdentifier(name, Ar.ResolvedPath(resolved)))
+    package, document = Ar.SplitPackageRelativePathInner(resolved)
+    return str(Ar.JoinPackageRelativePath(package, normpath(PurePosixPath(document).parent / name)))

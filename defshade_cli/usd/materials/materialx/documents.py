@@ -13,7 +13,7 @@ log = logging.getLogger("defshade")
 INSTALL = "pip install 'defshade[materialx]'"
 
 _SUFFIX = ".mtlx"
-_UNREADABLE = re.compile(r"Could not (?:open asset|load sublayer) @[^@]*\.mtlx[\]]?@")
+_UNREADABLE = re.compile(r"Could not (?:open asset|load sublayer) @[^@]*\.mtlx\]*@")
 
 
 def is_about_documents(diagnostic: str) -> bool:
