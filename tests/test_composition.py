@@ -295,6 +295,14 @@ def test_what_value_clips_alone_say_counts(tmp_path: Path) -> None:
     assert sizes == [1.0, 2.0] and names(reader.read(9.0)) == {"/stays"}
 
 
+def clipped(folder: Path, mesh: str, values: str, manifest: str) -> StageReader:
+    """Of a mesh with CLIPPED's clips, which have these values."""
+    clips = CLIPPED[CLIPPED.index("clips = ") : CLIPPED.rindex(")")]
+    for name, text in (("clip", values), ("manifest", manifest), ("shot", mesh.replace("CLIPS", clips))):
+        (folder / f"{name}.usda").write_text(f"#usda 1.0\n{text}\n")
+    return StageReader(open_stage(folder / "shot.usda"))
+
+
 def test_clips_alone_colour_a_mesh_that_moves(tmp_path: Path) -> None:
     """USD does not list such a primvar among those of the prim."""
     mesh = """def Mesh "blinks" (CLIPS) {
@@ -306,8 +314,18 @@ def test_clips_alone_colour_a_mesh_that_moves(tmp_path: Path) -> None:
         point3f[] points.timeSamples = { 0: [(0, 0, 0), (1, 0, 0), (0, 1, 0)], 10: [(0, 0, 1), (1, 0, 0), (0, 1, 0)] }
     }"""
     manifest = 'over "blinks" {\ncolor3f[] primvars:displayColor\npoint3f[] points\n}'
-    clips = CLIPPED[CLIPPED.index("clips = ") : CLIPPED.rindex(")")]
-    for name, text in (("clip", values), ("manifest", manifest), ("shot", mesh.replace("CLIPS", clips))):
-        (tmp_path / f"{name}.usda").write_text(f"#usda 1.0\n{text}\n")
-    (drawable,) = StageReader(open_stage(tmp_path / "shot.usda")).read(5.0).drawables
-    np.testing.assert_allclose(drawable.display_color, [(0.5, 0, 0.5)])
+    reader = clipped(tmp_path, mesh, values, manifest)
+    for frame in (0.0, 5.0):
+        (drawable,) = reader.read(frame).drawables
+        np.testing.assert_allclose(drawable.display_color, [(1 - frame / 10, 0, frame / 10)])
+
+
+def test_a_mesh_that_clips_leave_empty_for_a_while_is_waited_for(tmp_path: Path) -> None:
+    mesh = 'def Mesh "blinks" (CLIPS) {\npoint3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]\n}'
+    values = """over "blinks" {
+        int[] faceVertexCounts.timeSamples = { 0: [], 5: [3] }
+        int[] faceVertexIndices.timeSamples = { 0: [], 5: [0, 1, 2] }
+    }"""
+    manifest = 'over "blinks" {\nint[] faceVertexCounts\nint[] faceVertexIndices\n}'
+    reader = clipped(tmp_path, mesh, values, manifest)
+    assert [len(reader.read(frame).drawables) for frame in (0.0, 5.0)] == [0, 1]

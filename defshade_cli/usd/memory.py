@@ -152,7 +152,7 @@ class Memory:
     def _at_another_time(self, known: Surface, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Surface | None:
         """Read is no more than varies; what turns out to be equal stays the same object."""
         shown = self.materials.color_of(prim, said, material_subsets(prim), time), self._extras.primvars
-        moved = move_surface(known, prim, time) if known.groups and only_points_vary(prim, *shown) else None
+        moved = move_surface(known, prim, time) if known.groups and only_points_vary(prim, *shown, said) else None
         return shared(moved or self._read_surface(prim, time, said), known)
 
     def _read_surface(self, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Surface | None:

@@ -108,7 +108,7 @@ class PieceReader:
         if surface is None:
             self._found.report(prim, f"prims of type {prim.GetTypeName()} are not drawn")
             return None
-        piece, issues = self._standing_piece(prim, here, surface)
+        piece, issues = self._standing_piece(prim, here, surface, said)
         self._found.issues.update(dict.fromkeys(issues))
         return piece
 
@@ -143,11 +143,11 @@ class PieceReader:
         self, awaited: Awaited, surface: Surface | Exception, late: list[tuple[int, Unsupported]]
     ) -> Piece | None:
         """late: takes what is to say of it, with the place among the issues that it would have had."""
-        prim, _, here, place = awaited
+        prim, said, here, place = awaited
         try:
             if isinstance(surface, Exception):
                 raise surface
-            piece, issues = self._standing_piece(prim, here, surface)
+            piece, issues = self._standing_piece(prim, here, surface, said)
         except Exception as error:  # a bug goes on as one
             late.append((place, Unsupported(self._memory.names.shown(prim.GetPath()), blamed(error, prim))))
             return None
@@ -155,12 +155,12 @@ class PieceReader:
         return piece
 
     def _standing_piece(
-        self, prim: Usd.Prim, here: Standing, surface: Surface
+        self, prim: Usd.Prim, here: Standing, surface: Surface, said: Said
     ) -> tuple[Piece, tuple[Unsupported, ...]]:
         """The surface where it is drawn, and what is to say of it."""
         if surface.groups and here.rig:
             surface, here = self._deformed(prim, surface, here, here.rig)
-        self._found.dormant |= not surface.groups and is_time_varying(prim)
+        self._found.dormant |= not surface.groups and is_time_varying(prim, said=said)
         bindings = {path: self._memory.materials.bindings(path) for path in surface.groups}
         return self._piece(prim, here, surface, bindings), surface.issues
 

@@ -13,9 +13,14 @@ from defshade_cli.usd.said import Said, said_of
 from defshade_cli.usd.surfaces.shape import attributes_of
 
 
-def only_points_vary(prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = ()) -> bool:
+_OF_POINTS = {"points", "velocities", "accelerations"}
+
+
+def only_points_vary(
+    prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = (), said: Said | None = None
+) -> bool:
     """Is a mesh, if anything of it varies, the same but for its points?"""
-    return prim.IsA(UsdGeom.Mesh) and varying_names(prim, color, shown) <= {"points", "velocities", "accelerations"}
+    return prim.IsA(UsdGeom.Mesh) and varying_names(prim, color, shown, said) <= _OF_POINTS
 
 
 def is_time_varying(
@@ -28,7 +33,10 @@ def is_time_varying(
 def varying_names(
     prim: Usd.Prim, color: str = DISPLAY_COLOR, shown: tuple[str, ...] = (), said: Said | None = None
 ) -> set[str]:
-    """Of what read_surface reads, primvars inherited and face subsets included, what may differ over time."""
+    """Of what read_surface reads, primvars inherited and face subsets included, what may differ over time.
+
+    said: of the prim, without which nothing counts that value clips alone say.
+    """
     said = said or said_of(prim)
     attributes = (prim.GetAttribute(name) for name in attributes_of(prim) if name in said.names)
     subsets = (subset.GetIndicesAttr() for subset in material_subsets(prim))
