@@ -12,7 +12,6 @@ from defshade_cli.usd.polygons.subsets import material_subsets
 from defshade_cli.usd.said import Said, said_of
 from defshade_cli.usd.surfaces.shape import attributes_of
 
-
 _OF_POINTS = {"points", "velocities", "accelerations"}
 
 
