@@ -43,7 +43,7 @@ flat in uint visible_row;
 // Before any branch, because of the derivatives.
 Detail detail_of(vec3 normal) {
     Detail d;
-#ifdef PLANE_FACET
+#if defined(PLANE_FACET) || defined(PLANE_TRIANGLE)
     d.facet = facet_normal(dFdx(position_relative), dFdy(position_relative));
 #endif
 #ifdef LAYER_UV

@@ -12,5 +12,6 @@ void main() {
     ivec2 pixel = min(pixel_of_cell(ivec2(gl_FragCoord.xy)), ivec2(view.size) - 1);
     float stored = texelFetch(plane_depth, pixel, 0).x;
     if (stored == BACKGROUND_DEPTH) discard;
-    seen = look_up_shared(position_at(vec2(pixel) + 0.5, camera_depth(stored)));
+    vec3 position = position_at(vec2(pixel) + 0.5, camera_depth(stored));
+    seen = look_up_shared(position, triangle_of(read_planes(pixel)));
 }

@@ -30,5 +30,5 @@ void main() {
     s.clearcoat_roughness = widened_roughness(s.clearcoat_roughness, widening);
     vec3 v = direction_to_eye(position);
     float weight = luminance(irradiance * evaluate_brdf(s, v, l, vec3(0.0, 1.0, 1.0)));
-    sent = vec4(weight * vec2(visibility(light, position), 1.0), 1.0, 0.0);
+    sent = vec4(weight * vec2(visibility(light, position, triangle_of(s)), 1.0), 1.0, 0.0);
 }

@@ -112,7 +112,7 @@ def test_optional_planes_exist_only_when_needed() -> None:
     assert [p.name for p in needed_planes([PLASTIC])] == ["base", "normal"]
     glowing = replace(PLASTIC, emissive_color=(0.0, 1.0, 0.0))
     coated = replace(PLASTIC, clearcoat=1.0, ior=1.8)
-    lit = [p.name for p in PLANES if p.encodings["float"].read and p.name not in ("links", "weights")]
+    lit = [p.name for p in PLANES if p.encodings["float"].read and p.name not in ("links", "weights", "triangle")]
     assert [p.name for p in needed_planes([PLASTIC, glowing, coated])] == lit
     assert [p.name for p in named_planes(["emission", "depth", "base"])] == ["base", "emission"]
 

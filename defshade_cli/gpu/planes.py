@@ -149,6 +149,13 @@ PLANES: tuple[Plane, ...] = (
         ),
         lambda _: False,
     ),
+    Plane(
+        "triangle",  # whether it is needed is known with what lets through, and with shadows
+        4,
+        _encodings("vec4(d.facet, 0.0)", "s.triangle = t.xyz;", narrow="f2"),
+        lambda _: False,
+        ("POSITION",),
+    ),
     _detail("facet", 4, "vec4(d.facet, 0.0)", "POSITION"),
     _detail("tangent", 4, "vec4(d.tangent, 0.0)", "POSITION", "LAYER_UV"),
     _detail("uv", 2, "vec4(d.uv, 0.0, 0.0)", "LAYER_UV"),

@@ -109,13 +109,13 @@ def sharing_source(classes: int) -> dict[str, str]:
 
 
 def _look_ups_source() -> str:
-    """GLSL: `uvec2 look_up_shared(vec3 position)`, with every map's number written out."""
+    """GLSL: `uvec2 look_up_shared(vec3 position, vec3 triangle)`, with every map's number written out."""
     body: list[Any] = []
     for number in range(SHARED_DIRECTIONS):
         word, shift = "xy"[number // 8], 4 * (number % 8)
         body += [f"    light.first_shadow_map = {number}u;"]
-        body += [f"    seen.{word} |= uint(15.0 * visibility(light, position) + 0.5) << {shift}u;"]
-    head = ["uvec2 look_up_shared(vec3 position) {", "    uvec2 seen = uvec2(0u);", "    Light light;"]
+        body += [f"    seen.{word} |= uint(15.0 * visibility(light, position, triangle) + 0.5) << {shift}u;"]
+    head = ["uvec2 look_up_shared(vec3 position, vec3 triangle) {", "    uvec2 seen = uvec2(0u);", "    Light light;"]
     return "\n".join([*head, "    light.shadow_count = 1u;", *body, "    return seen;", "}"])
 
 

@@ -45,5 +45,6 @@ def divide_planes(
 
 def _lit_planes(scene: Scene, settings: RenderSettings, thin: tuple[Material, ...]) -> tuple[Plane, ...]:
     names = [plane.name for plane in needed_planes(scene.materials or (UNBOUND,))]
-    weights = ["weights"] * is_transparent(thin, settings.shading)
-    return named_planes([*names, *["links"] * scene.light_linked, *weights])
+    names += ["links"] * scene.light_linked + ["weights"] * is_transparent(thin, settings.shading)
+    falls_by_coins = any(material.opacity_threshold == 0.0 for material in thin)
+    return named_planes(names + ["triangle"] * (settings.shadows and falls_by_coins and len(names) < MOST_TARGETS - 1))

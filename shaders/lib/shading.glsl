@@ -101,7 +101,7 @@ Lit lit_by(Light light, vec3 l, vec3 irradiance, Surface surface, vec3 position,
     Lit lit;
     lit.sent = dot(irradiance, vec3(1.0)) * max(dot(surface.normal, l), 0.0);
     lit.volumes = 1.0;
-    float visible = visibility(light, position);
+    float visible = visibility(light, position, triangle_of(surface));
     lit.arrived = lit.sent * visible;
 #ifdef SHADOW_STYLES
     irradiance *= mix(light.shadow_color, vec3(1.0), visible);

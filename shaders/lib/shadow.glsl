@@ -12,6 +12,9 @@ struct ShadowTexel {
     float side;                // of its map, in texels
     float depth;               // of the receiver, as maps store it
     vec2 depth_coefficients;   // see ShadowMap
+#ifdef PLANE_TRIANGLE
+    mat3 gradients;            // columns: of the place along its sides and of the depth, by the position
+#endif
 };
 
 #ifdef SHADOW_CUBES
@@ -35,6 +38,13 @@ ShadowTexel in_cube(Light light, vec3 position) {
     at.place = at.least + cube_window.xy * across + cube_window.zw;
     at.depth = cube_depth.x / depth + cube_depth.y;
     at.depth_coefficients = cube_coefficients;
+#ifdef PLANE_TRIANGLE
+    float ahead = sign(sides.z);
+    mat3 along = mat3(vec3(-ahead, 0.0, -across.x * ahead) * cube_window.x,
+                      vec3(0.0, 1.0, -across.y * ahead) * cube_window.y,
+                      vec3(0.0, 0.0, -cube_depth.x / depth * ahead)) / depth;
+    for (int i = 0; i < 3; ++i) at.gradients[i] = x ? along[i].zxy : y ? along[i].yzx : along[i];
+#endif
     return at;
 }
 #endif
@@ -50,6 +60,9 @@ ShadowTexel in_map(Light light, vec3 position) {
     at.place = vec2(dot(map.x, relative), dot(map.y, relative)) / w;
     at.depth = dot(map.z, relative) / w;
     at.depth_coefficients = map.depth_coefficients;
+#ifdef PLANE_TRIANGLE
+    at.gradients = mat3(map.x.xyz - at.place.x * map.w.xyz, map.y.xyz - at.place.y * map.w.xyz, map.z.xyz - at.depth * map.w.xyz) / w;
+#endif
     return at;
 }
 #endif
@@ -133,6 +146,23 @@ Casters casters_at(vec2 place) {
     return Casters(z, z + x.on * dx + y.on * dy + aside * dx * dy - offset);
 }
 
+#ifdef PLANE_TRIANGLE
+const float LIFT = 0.5;        // texels: how far beside a receiver its surface may lie before its triangle's plane
+
+// Do the texels of a look-up show what lies before the plane of the receiver's triangle, as it goes on to their middles? Where
+// coins have texels show one layer or another, steps from texel to texel tell of no surface, and deep ones let light through.
+bvec4 is_before(vec4 stored, ShadowTexel at, vec2 place, vec3 triangle) {
+    mat3 g = at.gradients;
+    vec3 towards = cross(g[0], g[1]);                      // in which places stay; its length is texels over area
+    vec2 slope = vec2(dot(triangle, cross(g[2], g[1])), dot(triangle, cross(g[0], g[2]))) / dot(triangle, towards);
+    float texel = abs(dot(g[2], towards)) * pow(dot(towards, towards), -0.75);
+    vec2 low = floor(place + 0.5) - 0.5 - place;
+    vec4 plane = at.depth + slope.x * (low.x + vec4(0.0, 1.0, 1.0, 0.0)) + slope.y * (low.y + vec4(1.0, 1.0, 0.0, 0.0));
+    float offset = LIFT * texel + STEP_OFFSET * (abs(slope.x) + abs(slope.y));
+    return greaterThan(stored, max(plane, at.depth) + offset);
+}
+#endif
+
 #ifdef SHADOW_STYLES
 // UsdLuxShadowAPI: how much of each texel's shadow is left at the receiver. What the map knows is the occluder nearest to
 // the light.
@@ -149,12 +179,15 @@ vec4 shadow_strength(Light light, ShadowTexel at, vec4 stored, vec3 position) {
 #endif
 
 // Share of the light that reaches a relative position: the four nearest texels, bilinearly.
-float visibility(Light light, vec3 position) {
+float visibility(Light light, vec3 position, vec3 triangle) {
     if (light.shadow_count == 0u) return 1.0;
     ShadowTexel at = shadow_texel(light, position);
     vec2 place = clamp(at.place, at.least + 1.5, at.least + at.side - 1.5);
     Casters casters = casters_at(place);
     vec4 lit = vec4(lessThanEqual(casters.here, vec4(at.depth)));
+#ifdef PLANE_TRIANGLE
+    lit *= vec4(not(is_before(casters.stored, at, place, triangle)));
+#endif
 #ifdef SHADOW_STYLES
     lit = 1.0 - (1.0 - lit) * shadow_strength(light, at, casters.stored, position);
 #endif
@@ -165,11 +198,11 @@ float visibility(Light light, vec3 position) {
 #elif defined(SHARED_SHADOWS)
 #include "lib/shared_seen.glsl"
 
-float visibility(Light light, vec3 position) {
+float visibility(Light light, vec3 position, vec3 triangle) {
     return shared_visibility(light.first_shadow_map);
 }
 #else
-float visibility(Light light, vec3 position) {
+float visibility(Light light, vec3 position, vec3 triangle) {
     return 1.0;
 }
 #endif

@@ -35,7 +35,19 @@ struct Surface {
     vec2 weights;              // of the diffuse, and of lobes and emission: what a sample that was kept stands for
     float turn;                // of the normal over a pixel, squared
 #endif
+#ifdef PLANE_TRIANGLE
+    vec3 triangle;             // unit normal of what is drawn, facing the camera
+#endif
 };
+
+// For the look-ups of shadows that need it.
+vec3 triangle_of(Surface s) {
+#ifdef PLANE_TRIANGLE
+    return s.triangle;
+#else
+    return vec3(0.0);
+#endif
+}
 
 // Reflectance at normal incidence of a dielectric in air.
 float F0_from_ior(float ior) {
