@@ -175,7 +175,7 @@ def test_what_is_left_out_is_reported(text: str, reason: str) -> None:
 
 
 def test_an_untouched_stage_reports_nothing() -> None:
-    kinds = ("Scope", "Camera", "SkelRoot", "Material", "SphereLight")
+    kinds = ("Scope", "Camera", "SkelRoot", "Material", "SphereLight", "HoudiniLayerInfo")
     text = CUBE + "".join(f'def {kind} "{kind}" {{\n}}\n' for kind in kinds)
     assert read(text).unsupported == ()
 

@@ -39,6 +39,10 @@ _KINDS = (
 """The first schema that a prim is of decides."""
 
 
+_BOOKKEEPING = ("HoudiniLayerInfo",)
+"""Types that no schema defines and that hold nothing to draw: Solaris leaves one in each of its layers."""
+
+
 class Nature(NamedTuple):
     """What follows from a prim's type alone."""
 
@@ -64,6 +68,8 @@ class Kinds:
 
 
 def _classify(prim: Usd.Prim) -> Kind:
+    if prim.GetTypeName() in _BOOKKEEPING:
+        return Kind.SHADING
     if prim.GetTypeName() and not prim.GetPrimTypeInfo().GetSchemaTypeName():
         return Kind.UNKNOWN
     return next((kind for schema, kind in _KINDS if prim.IsA(schema)), Kind.GROUP)

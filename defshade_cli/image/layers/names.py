@@ -23,6 +23,9 @@ ALIASES: dict[str, str] = {
     "ray:hitP": "position",
     "ray:hitN": "normal",
     "ray:hitPz": "depth",
+    # Omniverse
+    "LdrColor": "beauty",
+    "HdrColor": "beauty",
     # files
     "rgba": "beauty",
     "rgb": "beauty",
