@@ -10,9 +10,10 @@ import pytest
 from numpy.typing import NDArray
 from pxr import Usd, UsdUtils
 
-from build import camera, quad, rotated, scene, sphere
+from build import camera, drawable, quad, rotated, scene, sphere
 from defshade_cli.gpu.context import Gpu
 from defshade_cli.image.environment import sky_of
+from defshade_cli.passes import sky_visibility
 from defshade_cli.passes.pipeline import Pipeline
 from defshade_cli.plan import make_plan
 from defshade_cli.scene.environment import Environment
@@ -63,6 +64,21 @@ def test_a_white_wall_under_a_white_dome_is_white(pipeline: Pipeline, samples: i
     """E = π L. Sixteen samples are 64 directions, half of them behind the wall: 5 % is what is left of chance."""
     image = render(pipeline, scene([quad(9.0)], [dome()], [WHITE]), samples=samples)
     np.testing.assert_allclose(image[..., :3].mean(), 1.0, rtol=0.05)
+
+
+def test_directions_teach_the_same_however_many_a_draw(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of what a metal sees of the sky around a pane that lets some of it through; floats add up in other orders."""
+    glass, metal = replace(WHITE, opacity=0.5), replace(MIRROR, roughness=0.2)
+    meshes = [sphere(), quad(3.0, -1.0), quad(0.7, 1.2)]
+    drawn = [drawable(mesh, number, number) for number, mesh in enumerate(meshes)]
+    of = scene(meshes, [dome(environment=six_colours())], [metal, WHITE, glass], drawables=drawn)
+    plan = make_plan(of, RenderSettings(size=(32, 32)))
+    assert any(plan.hides_sky(planned) for planned in plan.domes)
+    found = []
+    for most in (1, 5, 64):
+        monkeypatch.setattr(sky_visibility, "_MOST", most)
+        found.append(Pipeline(gpu).render(of, plan).layers["beauty"])
+    np.testing.assert_allclose(found[1:], [found[0]] * 2, rtol=1e-4, atol=1e-6)
 
 
 def test_a_lid_hides_the_dome_and_needs_samples_to_do_so(pipeline: Pipeline) -> None:

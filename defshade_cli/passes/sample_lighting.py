@@ -92,7 +92,7 @@ class SampleLighting:
         self._volumes_pass = cache(lambda variant: LightingPass(gpu, variant, screen))
         self._tiles, self._whole = LightTiles(gpu, frame), WholeLighting(gpu, screen)
         self._shared = SharedShadows(gpu, frame)
-        self._visibility_pass = cache(lambda variant: SkyVisibilityPass(gpu, variant, screen))
+        self._openness = SkyVisibilityPass(gpu, screen)
         self._environment_pass = cache(lambda variant: EnvironmentPass(gpu, variant, screen, skies))
         self._lobes = Lobes(gpu, frame, skies)
 
@@ -121,9 +121,8 @@ class SampleLighting:
         plan, visibility = lit.plan, canvas.visibility
         if plan.lighting == "tiles":
             self._tiles.begin(canvas.gbuffer, plan, sample, canvas.known.drawn)
-        openness = self._visibility_pass(lit.variant) if visibility else None
-        if openness and visibility:
-            openness.begin_sample(visibility)
+        if visibility:
+            self._openness.begin_sample(visibility)
         turns = count(sample.index + 1)
         batches = light_batches(lit.scene, plan, sample, canvas.guides) if plan.lit else ()
         for number, batch in enumerate(batches):
@@ -133,10 +132,8 @@ class SampleLighting:
             runs = shared_runs(lights, plan) if shadows else []
             own = apart_from(len(lights), runs)
             self._add_apart(lit, [lights[n] for n in own], records[own], canvas, shadows and shadows.part(own))
-            if openness and visibility and shadows:
-                if runs:
-                    self._records.write(records)
-                openness.add(lights, plan, canvas.gbuffer, visibility, shadows)
+            if visibility and shadows:
+                self._openness.add(lights, records, plan, canvas.gbuffer, visibility, shadows)
             for run in runs:
                 assert shadows
                 self._add_shared(lit, lights[run], records[run], canvas, shadows.part(run), next(turns))

@@ -84,7 +84,7 @@ class Sampler:
         targets = self._frame.light_targets(self._frame.radiance("sample", plan.size, gbuffer), plan)
         targets.clear()
         hidden = any(plan.hides_sky(dome) for dome in plan.domes)
-        visibility = SkyVisibility.of(self._frame, plan.size) if hidden else None
+        visibility = SkyVisibility.of(self._frame, plan.size, gbuffer) if hidden else None
         return Canvas(gbuffer, targets, visibility, guides, known)
 
     def _guides(self, draws: DrawList, plan: Plan) -> SkyGuides:
