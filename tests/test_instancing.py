@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
 from defshade_cli.usd.instancing.instancing import Piece, Placement, place
-from defshade_cli.usd.materials.binding import NOTHING_BOUND, Bindings
+from defshade_cli.usd.materials.bindings import NOTHING_BOUND, Bindings
 from defshade_cli.usd.options import ReadOptions
 from defshade_cli.usd.reader import StageReader
 from stages import (
@@ -75,6 +75,42 @@ def test_instances_hand_down_their_color() -> None:
     trunk = drawable_at(read(text), "/a/trunk")
     np.testing.assert_allclose(trunk.display_color, [[1, 0, 0], [0.18, 0.18, 0.18], [0, 0, 1]], rtol=1e-6)
     np.testing.assert_allclose(trunk.display_opacity, [1, 1, 0.5])
+
+
+def material_of(primvar: str) -> str:
+    """A material of the primvar's name, of which its colour is."""
+    return f"""def Material "{primvar}" {{
+        token outputs:surface.connect = </{primvar}/s.outputs:surface>
+        def Shader "s" {{
+            uniform token info:id = "UsdPreviewSurface"
+            color3f inputs:diffuseColor.connect = </{primvar}/r.outputs:result>
+            token outputs:surface
+        }}
+        def Shader "r" {{
+            uniform token info:id = "UsdPrimvarReader_float3"
+            string inputs:varname = "{primvar}"
+            float3 outputs:result
+        }}
+    }}
+    """
+
+
+TWO_COLORS = """def Cube "trunk" {
+    color3f[] primvars:displayColor = [(1, 0, 0)]
+    color3f[] primvars:paint = [(0, 0, 1)]
+}"""
+
+
+def test_a_material_outside_finds_its_colour_inside_the_prototype() -> None:
+    """As if each stood by itself: a bare instance, one that wears it, one inside that, one whose own is beaten."""
+    text = material_of("paint") + material_of("displayColor")
+    text += f'class Xform "tree" {{\n{TWO_COLORS}\n}}\nclass Xform "grove" {{\n{instance("one")}}}\n'
+    text += bound(f'class Xform "blue" (\n) {{\n{TWO_COLORS}\n}}\n', "paint")
+    text += instance("bare") + bound(instance("worn"), "paint") + bound(instance("grown", source="grove"), "paint")
+    text += bound(instance("over", source="blue"), "displayColor", "strongerThanDescendants")
+    red, blue = [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]
+    found = {p: c for d in read(text).drawables for p, c in zip(d.paths, d.display_color.tolist(), strict=True)}
+    assert found == {"/bare/trunk": red, "/worn/trunk": blue, "/grown/one/trunk": blue, "/over/trunk": red}
 
 
 def test_a_color_inside_the_prototype_goes_before_the_instances() -> None:

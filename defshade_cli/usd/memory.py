@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
@@ -73,8 +73,8 @@ class Memory:
         self.materials = Materials(stage, self.names, occlusion=extras.occlusion)
         self._extras, self._as_cages = extras, as_cages
         self._shapes = Shapes()
-        self._surfaces: dict[str, tuple[Usd.TimeCode, Surface | None]] = {}
-        self._time_varying: dict[str, bool] = {}
+        self._surfaces: dict[Hashable, tuple[Usd.TimeCode, Surface | None]] = {}
+        self._time_varying: dict[Hashable, bool] = {}
         self._models = draw_mode.StandIns(seen_from)
         self._stand_ins: dict[tuple[Sdf.Path, str], Surface] = {}
 
@@ -97,16 +97,16 @@ class Memory:
 
     def surface(self, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Surface | None:
         """The same object at every time, unless something of the prim varies."""
-        time_read, known = self._surfaces.get(said.path, (None, None))
+        time_read, known = self._surfaces.get(said.key, (None, None))
         if time_read is not None and (time == time_read or not self._is_time_varying(prim, said)):
             return known
         surface = self._at_another_time(known, prim, time, said) if known else self._read_surface(prim, time, said)
-        self._surfaces[said.path] = time, surface
+        self._surfaces[said.key] = time, surface
         return surface
 
     def is_unknown_mesh(self, said: Said) -> bool:
         """Is it one to be asked with others?"""
-        return said.type_name == "Mesh" and not self._extras.primvars and said.path not in self._surfaces
+        return said.type_name == "Mesh" and not self._extras.primvars and said.key not in self._surfaces
 
     def new_surfaces(
         self, prims: Sequence[Usd.Prim], saids: Sequence[Said], time: Usd.TimeCode
@@ -146,7 +146,7 @@ class Memory:
         else:
             shape = Shape(polygons)
             surface = self._as_shown(surface_of(prim, said, time, shape, self._shapes, asked.subsets, []))
-        self._surfaces[said.path] = time, surface
+        self._surfaces[said.key] = time, surface
         return surface
 
     def _at_another_time(self, known: Surface, prim: Usd.Prim, time: Usd.TimeCode, said: Said) -> Surface | None:
@@ -178,10 +178,10 @@ class Memory:
 
     def _is_time_varying(self, prim: Usd.Prim, said: Said) -> bool:
         """Asked only when a second frame is read."""
-        if said.path not in self._time_varying:
+        if said.key not in self._time_varying:
             color = self.materials.color_of(prim, said, material_subsets(prim), Usd.TimeCode.Default())
-            self._time_varying[said.path] = is_time_varying(prim, color, self._extras.primvars, said)
-        return self._time_varying[said.path]
+            self._time_varying[said.key] = is_time_varying(prim, color, self._extras.primvars, said)
+        return self._time_varying[said.key]
 
     def _as_shown(self, surface: Surface) -> Surface:
         shown = self.names.shown(surface.path)

@@ -10,7 +10,7 @@ from pxr import Usd
 from defshade_cli.scene.material import UNBOUND, Material
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.instancing.instancing import Piece, some
-from defshade_cli.usd.materials.binding import PURPOSES, Bindings
+from defshade_cli.usd.materials.bindings import PURPOSES, Bindings
 from defshade_cli.usd.materials.materials import Materials
 from defshade_cli.usd.materials.worn import Value, on_mesh, read_values, with_primvars
 from defshade_cli.usd.surfaces.geometry import Gprim

@@ -17,7 +17,7 @@ from defshade_cli.usd.instancing.instancing import Piece, Standing
 from defshade_cli.usd.kind import Kind
 from defshade_cli.usd.lights.light import is_light, read_light
 from defshade_cli.usd.lights.mesh_light import Glow
-from defshade_cli.usd.materials.binding import Bindings, bound_to
+from defshade_cli.usd.materials.bindings import Bindings, bound_to
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.models.draw_mode import FULL
 from defshade_cli.usd.said import Said

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from pxr import Usd, UsdGeom
 
 from defshade_cli.dataclass import dataclass
+from defshade_cli.usd.materials.bindings import NOTHING_BOUND, Bindings
 
 _PRIMVARS, _INDICES, _NORMALS, _MATERIALS = "primvars:", ":indices", "primvars:normals", "material:"
 
@@ -43,6 +44,7 @@ class Said:
     own_primvars: are any authored on it?  inherited: those of its ancestors.
     schemas: applied to it, those of its type too.
     is_leaf: no prim at all stands below; an instance is one.
+    outer: what is bound outside the prototype that it is in, see Materials.outer.
     """
 
     path: str
@@ -55,6 +57,12 @@ class Said:
     inherited: Inherited
     schemas: Sequence[str]
     is_leaf: bool
+    outer: Bindings = NOTHING_BOUND
+
+    @property
+    def key(self) -> Hashable:
+        """Of what is read of the prim."""
+        return (self.path, self.outer) if any(self.outer) else self.path
 
     @property
     def primvars(self) -> bool:
@@ -83,6 +91,7 @@ def said_of(
     *,
     is_surface: bool = True,
     clipped: bool = False,
+    outer: Bindings = NOTHING_BOUND,
 ) -> Said:
     """type_name, inherited: of the prim, where they are known.
 
@@ -98,6 +107,7 @@ def said_of(
         Inherited(prim.GetParent()) if inherited is None else inherited,
         prim.GetAppliedSchemas(),
         not prim.GetAllChildrenNames(),
+        outer,
     )
 
 

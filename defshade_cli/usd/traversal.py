@@ -17,6 +17,7 @@ from defshade_cli.usd.blame import blamed
 from defshade_cli.usd.instancing.instancing import Piece, Placement, Standing, finite, place
 from defshade_cli.usd.instancing.native_instances import NativeInstances, rebound
 from defshade_cli.usd.kind import Kind, Nature
+from defshade_cli.usd.materials.bindings import Bindings
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.models.draw_mode import FULL, handed_down, mode_above, takes_effect
 from defshade_cli.usd.pieces import Awaited, Found, PieceReader
@@ -52,7 +53,7 @@ class Traversal:
         self._reader = PieceReader(memory, time, base, purposes, self.found)
         self._stage, self._memory, self._rules = stage, memory, rules
         self._time, self._base = time, base
-        self._prototypes: dict[tuple[Sdf.Path, Sdf.Path | None], tuple[Piece, ...] | None] = {}
+        self._prototypes: dict[tuple[Sdf.Path, Sdf.Path | None, Bindings], tuple[Piece, ...] | None] = {}
         memory.xforms.SetTime(time)
 
     def read_stage(self) -> tuple[Piece, ...]:
@@ -94,7 +95,8 @@ class Traversal:
         if kind is Kind.SHADING or self._is_pruned(prim):
             return (), above
         is_surface = kind is Kind.GPRIM
-        said = said_of(prim, nature.type_name, above.primvars, is_surface=is_surface, clipped=self._memory.clipped)
+        clipped, outer = self._memory.clipped, above.outer
+        said = said_of(prim, nature.type_name, above.primvars, is_surface=is_surface, clipped=clipped, outer=outer)
         here = self._stand(prim, above, nature, said)
         if here is None:
             return (), above
@@ -127,7 +129,7 @@ class Traversal:
             return above._replace(draw_mode=mode)
         if _VISIBILITY in said.names and not self._is_visible(prim):
             return None
-        root_from_prim, in_world, purpose, _, rig, proxied, primvars = above
+        root_from_prim, in_world, purpose, _, rig, proxied, primvars, outer = above
         if _XFORM_OPS in said.names:
             local, resets = self._memory.xforms.GetLocalTransformation(prim)
             in_world |= resets
@@ -135,7 +137,7 @@ class Traversal:
         if _PURPOSE in said.names:
             authored = prim.GetAttribute(_PURPOSE)
             purpose = str(authored.Get()) if authored.HasAuthoredValue() else purpose
-        here = Standing(root_from_prim, in_world, purpose, mode, rig, proxied, primvars)
+        here = Standing(root_from_prim, in_world, purpose, mode, rig, proxied, primvars, outer)
         return here.with_rig(prim) if nature.is_skel_root else here
 
     def _is_hidden(self, prim: Usd.Prim) -> bool:
@@ -154,11 +156,12 @@ class Traversal:
 
     def _native_instances(self, instances: NativeInstances) -> Iterator[Piece]:
         for sharing, first, placement in instances.placements(self._time):
-            key = sharing.prototype, sharing.animation
+            outer = self._memory.materials.outer(sharing.bindings.under(first.here.outer), self._time)
+            key = sharing.prototype, sharing.animation, outer
             if key not in self._prototypes:
                 children = first.prim.GetPrototype().GetChildren()
-                self._prototypes[key] = self._read(children, first.here.inside(first.prim))
-            placed = self._placed(self._prototypes[key] or (), placement)
+                self._prototypes[key] = self._read(children, first.here.inside(first.prim, outer))
+            placed = self._placed(self._prototypes[key] or (), placement, first.here.outer)
             if sharing.by_collection:
                 placed = chain.from_iterable(rebound(piece, self._memory, first.prim) for piece in placed)
             yield from placed
@@ -170,27 +173,32 @@ class Traversal:
 
         swarm = read_point_instancer(prim, self._time, self._base)
         self.found.dormant |= not swarm.placements and has_varying_copies(prim)
+        bindings = self._memory.materials.bindings(prim.GetPath())
+        outer = self._memory.materials.outer(bindings.under(here.outer), self._time)
         for path, placement in swarm.placements:
             placed = replace(
                 placement,
                 root_from_copy=matrix(here.root_from_prim) @ placement.root_from_copy,
                 purpose=here.purpose,
-                bindings=self._memory.materials.bindings(prim.GetPath()),
+                bindings=bindings,
                 in_world=here.in_world,
             )
-            yield from self._placed(self._point_prototype(path, prim, here), placed)
+            yield from self._placed(self._point_prototype(path, prim, here, outer), placed, here.outer)
         self.found.report(prim, *swarm.issues)
 
-    def _placed(self, pieces: Iterable[Piece], placement: Placement) -> Iterator[Piece]:
-        """Each with the colours of the primvar that its materials read."""
+    def _placed(self, pieces: Iterable[Piece], placement: Placement, outer: Bindings) -> Iterator[Piece]:
+        """Each with the colours of the primvar that its materials read. outer: of where it is placed."""
+        above = placement.bindings.under(outer)
         for piece in pieces:
-            bound = [bindings.under(placement.bindings) for bindings in piece.bindings.values()]
+            bound = [bindings.under(above) for bindings in piece.bindings.values()]
             color = self._memory.materials.color_by(bound, self._time)
             yield from place([piece], placement.colored_by(color))
 
-    def _point_prototype(self, path: Sdf.Path, instancer: Usd.Prim, here: Standing) -> tuple[Piece, ...]:
+    def _point_prototype(
+        self, path: Sdf.Path, instancer: Usd.Prim, here: Standing, outer: Bindings
+    ) -> tuple[Piece, ...]:
         """A prototype's subtree with its root's own transform; of what stands above it only the purpose counts."""
-        key = path, None
+        key = path, None, outer
         if key not in self._prototypes:
             root = self._stage.GetPrimAtPath(path)
             if not root or not root.IsActive():
@@ -200,7 +208,7 @@ class Traversal:
             above = UsdGeom.Imageable(root.GetParent()).ComputePurposeInfo()
             purpose = str(above.purpose) if above.isInheritable else None
             primvars = Inherited(root.GetParent())
-            standing = Standing(IDENTITY, False, purpose, mode_above(root), None, here.proxied, primvars)
+            standing = Standing(IDENTITY, False, purpose, mode_above(root), None, here.proxied, primvars, outer)
             self._prototypes[key] = self._read([root], standing, _PROTOTYPE_CHILDREN)
         pieces = self._prototypes[key]
         if pieces is None:

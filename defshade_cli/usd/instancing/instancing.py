@@ -21,7 +21,7 @@ from pxr import Gf, Sdf, Usd
 from defshade_cli.dataclass import dataclass
 from defshade_cli.errors import StageError
 from defshade_cli.scene.light import Light
-from defshade_cli.usd.materials.binding import NOTHING_BOUND, Bindings
+from defshade_cli.usd.materials.bindings import NOTHING_BOUND, Bindings
 from defshade_cli.usd.polygons.primvars import DISPLAY_COLOR, Elements, read_display
 from defshade_cli.usd.said import NOTHING_INHERITED, Inherited
 from defshade_cli.usd.surfaces.geometry import Surface
@@ -43,6 +43,7 @@ class Standing(NamedTuple):
     rig: the outermost SkelRoot.
     proxied: the prototype that is walked and an instance of it, by whose proxies its prims are known on the stage.
     primvars: that are inherited below it; into a prototype USD lets none.
+    outer: what is bound outside the prototype that is walked, see Materials.outer.
     """
 
     root_from_prim: Gf.Matrix4d = IDENTITY
@@ -52,6 +53,7 @@ class Standing(NamedTuple):
     rig: Rig | None = None
     proxied: tuple[Sdf.Path, Sdf.Path] | None = None
     primvars: Inherited = NOTHING_INHERITED
+    outer: Bindings = NOTHING_BOUND
 
     def on_stage(self, prim: Usd.Prim) -> Usd.Prim:
         """The prim, or the proxy of one in a prototype."""
@@ -65,12 +67,12 @@ class Standing(NamedTuple):
 
         return self if self.rig else self._replace(rig=Rig(self.on_stage(root), self.root_from_prim, self.in_world))
 
-    def inside(self, instance: Usd.Prim) -> Standing:
-        """What an instance hands down into its prototype: nothing but its rig."""
+    def inside(self, instance: Usd.Prim, outer: Bindings) -> Standing:
+        """What an instance hands down into its prototype: nothing but its rig, and what is bound out here."""
         proxy = self.on_stage(instance)
         rig = self.rig and type(self.rig)(proxy, IDENTITY, False)
         proxied = instance.GetPrototype().GetPath(), proxy.GetPath()
-        return Standing(rig=rig, proxied=proxied)
+        return Standing(rig=rig, proxied=proxied, outer=outer)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

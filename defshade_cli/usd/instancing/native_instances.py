@@ -20,7 +20,7 @@ from defshade_cli.usd.instancing.instancing import (
     read_display_of_instances,
     some,
 )
-from defshade_cli.usd.materials.binding import Bindings
+from defshade_cli.usd.materials.bindings import Bindings
 from defshade_cli.usd.memory import Memory
 from defshade_cli.usd.surfaces.geometry import Surface
 from defshade_cli.usd.xform import matrices

@@ -18,7 +18,7 @@ from defshade_cli.scene.light import Light
 from defshade_cli.scene.material import UNBOUND, Material
 from defshade_cli.scene.mesh_light import MeshLight
 from defshade_cli.usd.instancing.instancing import Piece
-from defshade_cli.usd.materials.binding import Bindings
+from defshade_cli.usd.materials.bindings import Bindings
 from defshade_cli.usd.surfaces.geometry import Gprim
 
 _TINTED, _SILENT = "materialGlowTintsLight", "noMaterialResponse"

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 from pxr import Sdf, Usd, UsdGeom
 
 from defshade_cli.usd.blame import blamed
-from defshade_cli.usd.materials.binding import NOTHING_ABOVE, NOTHING_BOUND, Bindings, Bound, Known, read_bound
+from defshade_cli.usd.materials.binding import NOTHING_ABOVE, Bound, Known, read_bound
+from defshade_cli.usd.materials.bindings import NOTHING_BOUND, Bindings
 from defshade_cli.usd.materials.material import ReadMaterial, not_understood, read_material
 from defshade_cli.usd.models import draw_mode
 from defshade_cli.usd.names import Names
@@ -69,11 +70,20 @@ class Materials:
     def color_of(self, prim: Usd.Prim, said: Said, subsets: Iterable[UsdGeom.Subset], time: Usd.TimeCode) -> str:
         """What stands for displayColor: the primvar that a material bound to the prim reads its colour from."""
         bound = [self._bound(said.path, prim, said), *[self._bound(str(s.GetPath()), s.GetPrim()) for s in subsets]]
-        return self.color_by([each.bindings for each in bound], time)
+        return self.color_by([each.bindings.under(said.outer) for each in bound], time)
 
     def color_by(self, bound: Iterable[Bindings], time: Usd.TimeCode) -> str:
         """The same of what is bound to a prim and its subsets, in order."""
         return next((color for each in bound if (color := self._color_by(each, time))), DISPLAY_COLOR)
+
+    def outer(self, bindings: Bindings, time: Usd.TimeCode) -> Bindings:
+        """What is bound outside a prototype, as far as its surfaces may be read otherwise for it: by their colours.
+
+        That is by another primvar than displayColor, or by this one in place of what is bound inside.
+        """
+        stronger = (self.read(binding.material, time) for binding in bindings if binding and binding.stronger)
+        reads_color = any(read.understood and read.material.uses_display_color for read in stronger)
+        return bindings if reads_color or self._color_by(bindings, time) else NOTHING_BOUND
 
     def _color_by(self, bindings: Bindings, time: Usd.TimeCode) -> str:
         """The same of some bindings, empty where none does; found once for all prims with these."""

@@ -12,7 +12,7 @@ from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.camera import Camera
 from defshade_cli.scene.window import WHOLE_IMAGE
 from defshade_cli.spaces import ConformPolicy
-from defshade_cli.usd.materials.binding import PURPOSES
+from defshade_cli.usd.materials.bindings import PURPOSES
 from defshade_cli.usd.render_settings.products import find_settings
 
 log = logging.getLogger("defshade")
