@@ -62,6 +62,22 @@ def test_a_texel_a_pixel_is_the_image(pipeline: Pipeline, tmp_path: Path, color_
     np.testing.assert_allclose(albedo, decoded(pixels[..., :3] / 255), atol=2e-3)  # type: ignore[operator]
 
 
+def test_an_edge_in_the_middle_of_a_pixel_leaves_its_neighbours_alone(pipeline: Pipeline, tmp_path: Path) -> None:
+    """Of 64 samples each reads its own cell, an eighth of a pixel wide, and not what a pixel does.
+
+    The image is kept at two texels a pixel, so that the edge is a ramp of half a pixel.
+    """
+    pixels = np.zeros((64, 64, 3), np.uint8)
+    pixels[:, 34:] = 255
+    glow = TextureInput(plain(save(tmp_path / "a.png", pixels), wrap_s="clamp", wrap_t="clamp"))
+    black = {"diffuse_color": (0.0, 0.0, 0.0), "use_specular_workflow": True, "roughness": 1.0}
+    built = replace(textured({"emissive_color": glow}, **black), lights=())
+    plan = make_plan(built, RenderSettings(size=(SIDE, SIDE), samples=64))
+    shown = pipeline.render(built, plan).layers["beauty"][..., 0]
+    expected = np.where(np.arange(SIDE) < 8, 0.0, np.where(np.arange(SIDE) > 8, 1.0, 0.5))
+    np.testing.assert_allclose(shown, np.broadcast_to(expected, shown.shape), atol=0.01)
+
+
 def test_channel_scale_and_bias(pipeline: Pipeline, tmp_path: Path) -> None:
     pixels = noise(3)
     texture = plain(save(tmp_path / "a.png", pixels), color_space="raw")

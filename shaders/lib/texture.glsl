@@ -1,6 +1,7 @@
 #include "lib/records.glsl"
 #include "lib/tangent.glsl"
 #include "lib/uv.glsl"
+#include "lib/view.glsl"
 
 layout(std430, binding = 5) readonly buffer TextureInputBlock { TextureInput texture_inputs[]; };
 layout(std430, binding = 6) readonly buffer TileBlock { Tile tiles[]; };
@@ -12,6 +13,7 @@ const uint WRAP_MIRROR = 3u;
 const uint WRAP_UDIM = 4u;
 const uint NO_GROUP = 0xffffffffu;
 const uint ALL_CHANNELS = 4u;
+const float NARROWEST = 0.125;     // of a pixel: finer mip levels cost more than they show
 
 #include "generated/textures.glsl"
 
@@ -51,8 +53,11 @@ Tile find_tile(TextureInput t, inout Coordinates c) {
     return tiles[t.first_tile + uint(index)];
 }
 
-// UsdUVTexture's output at some coordinates.
+// UsdUVTexture's output at some coordinates, over the cell of its pixel that the sample stands for: as in pbrt-v4, whose ray
+// differentials shrink with the number of samples, or the limit would be an image filtered twice.
 vec4 read_texture(TextureInput t, Coordinates c) {
+    c.dx *= max(view.cell.z, NARROWEST);
+    c.dy *= max(view.cell.w, NARROWEST);
     Tile tile = find_tile(t, c);
     vec4 texel = read_tile(tile, t, c);
     return (t.channel == ALL_CHANNELS ? texel : vec4(texel[t.channel])) * t.scale + t.bias;
