@@ -67,6 +67,18 @@ def test_a_tree_holds_every_triangle_in_boxes_within_boxes() -> None:
     }
 
 
+@pytest.mark.parametrize("away", [0.0, 1e4])
+def test_packed_boxes_hold_the_boxes(away: float) -> None:
+    """By half a step of the grid or more, as far as float32 tells, and by two at most; a flat root's too."""
+    for of in (scene([sphere(), quad(2.0, -1.0 - away)], [DOME]), scene([quad(3.0, 1.0)], [DOME])):
+        tree = triangle_tree(of)
+        low, step = (each.astype(np.float64) for each in tree.grid)
+        packed = tree.packed_boxes[1:, :3]
+        least, greatest = (packed & 0xFFFF) * step + low, (packed >> 16) * step + low
+        for outwards in (tree.boxes[1:, 0] - least, greatest - tree.boxes[1:, 1]):
+            assert (outwards > 0.49 * step).all() and (outwards < 2.01 * step).all()
+
+
 def test_a_tree_of_nothing_meets_nothing(gpu: Gpu) -> None:
     rays = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])
     assert not met(gpu, triangle_tree(scene([], [DOME])), rays).any()
@@ -93,9 +105,10 @@ def met(gpu: Gpu, tree: TriangleTree, rays: NDArray[np.float64], reach: float = 
     """(R,) what lib/rays.glsl says of rays (R, 2, 3), origins from the tree's centre."""
     program = gpu.shaders.compute("rays_probe.comp", [], {"rays_probe.comp": _PROBE})
     program["tree_shape"], program["tree_from_relative"] = (tree.leaves, tree.leaf_size), (0.0, 0.0, 0.0)
+    program["grid_low"], program["grid_step"] = (tuple(each.tolist()) for each in tree.grid)
     texels = in_texels(rays.astype(np.float32))
     texels[:, 0, 3] = reach
-    buffers = {0: texels, 9: in_texels(tree.boxes), 10: in_texels(tree.edges)}
+    buffers = {0: texels, 9: tree.packed_boxes, 10: in_texels(tree.edges)}
     kept = [gpu.context.buffer(rows.tobytes()) for rows in buffers.values()]
     results = gpu.context.buffer(reserve=4 * len(rays))
     for binding, buffer in zip([*buffers, 1], [*kept, results], strict=True):

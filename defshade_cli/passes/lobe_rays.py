@@ -54,7 +54,7 @@ class TreeStore:
             from defshade_cli.scene.triangle_tree import triangle_tree
 
             self._tree = triangle_tree(scene)
-            self._boxes.write(in_texels(self._tree.boxes))
+            self._boxes.write(self._tree.packed_boxes)
             self._triangles.write(in_texels(self._tree.edges))
         self._scene = scene
         return self._tree
@@ -116,6 +116,7 @@ class LobeRays:
         """Of shaders/lobe_rays.frag and shaders/lib/rays.glsl."""
         uniforms: dict[str, object] = {"rays": plan.lobe_rays}
         if self.tree:
+            uniforms["grid_low"], uniforms["grid_step"] = (tuple(each.tolist()) for each in self.tree.grid)
             uniforms["tree_rounding"] = self.tree.rounding
             uniforms["tree_shape"] = self.tree.leaves, self.tree.leaf_size
             uniforms["tree_from_relative"] = tuple(plan.camera.position - self.tree.centre)

@@ -18,6 +18,9 @@ from defshade_cli.spaces import transform_points
 _LEAF = 4
 """Triangles of a leaf at most."""
 
+_STEPS = 65530
+"""Of a grid, along each axis of the root; 16 bits hold some more around them."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TriangleTree:
@@ -34,6 +37,21 @@ class TriangleTree:
     def leaves(self) -> int:
         """How many there are."""
         return len(self.boxes) // 2
+
+    @property
+    def grid(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """(3,) each: the least corner of a grid around the root, and its steps, which are small across a flat one."""
+        low, high = self.boxes[1].astype(np.float64)
+        step = np.maximum(high - low, 1e-6 * np.abs(self.boxes[1]).max() + 1e-30) / _STEPS
+        return (low - 2.0 * step).astype(np.float32), step.astype(np.float32)
+
+    @property
+    def packed_boxes(self) -> NDArray[np.uint32]:
+        """(2L, 4) on the grid, half a step or more outwards: of each axis the least in 16 bits, the greatest above."""
+        low, step = (each.astype(np.float64) for each in self.grid)
+        at = np.clip((self.boxes - low) / step + [[-0.5], [0.5]], 0.0, 65535.0)
+        least, greatest = np.floor(at[:, 0]).astype(np.uint32), np.ceil(at[:, 1]).astype(np.uint32)
+        return np.pad(least | greatest << np.uint32(16), ((0, 0), (0, 1)))
 
     @property
     def rounding(self) -> float:
