@@ -116,3 +116,28 @@ def test_nothing_of_it_is_read_unasked() -> None:
     assert extras_of(["semantic", "primvars:b", "primvars:a"]).primvars == ("a", "b")
     plan = make_plan(scene([quad()], [sun()]), RenderSettings(layers=("primvars:a", "depth")))
     assert [plane.name for plane in plan.data_planes] == ["primvar_0"] and plan.inputs == {"PRIMVARS"}
+
+
+def test_what_an_instance_hands_down_is_not_shown_and_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """One mesh stands for all instances; what is authored inside is shown."""
+    (tmp_path / "stage.usda").write_text(INSTANCED)
+    with caplog.at_level(logging.WARNING):
+        layers = render(tmp_path / "stage.usda", size=(8, 8), layers=("primvars:wear", "primvars:panel")).layers
+    assert not layers["primvars:wear"].any() and layers["primvars:panel"].max() == 4
+    assert "primvars:wear is not shown of what is inside the instance (/set/a)" in caplog.text
+
+
+INSTANCED = """#usda 1.0
+class Xform "part" {
+    def Cube "cube" {
+        int[] primvars:panel = [4]
+    }
+}
+def Xform "set" {
+    float[] primvars:wear = [0.25]
+    def Xform "a" (
+        instanceable = true
+        inherits = </part>
+    ) {}
+}
+"""

@@ -78,6 +78,11 @@ class Memory:
         self._models = draw_mode.StandIns(seen_from)
         self._stand_ins: dict[tuple[Sdf.Path, str], Surface] = {}
 
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Primvars that layers show."""
+        return self._extras.primvars
+
     @cached_property
     def rigs(self) -> Rigs:
         """What skeletons deform."""

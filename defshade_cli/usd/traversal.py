@@ -115,12 +115,20 @@ class Traversal:
             return (), here
         if is_instance and not _is_rigged_from_above(prim, here):
             instances.add(prim, here)
+            self._tell_of_unshown(prim)
             return (), here
         if said.is_leaf and not is_instance:
             return (), here
         chosen = Usd.TraverseInstanceProxies(predicate) if here.rig else predicate
         below = here._replace(primvars=Inherited(prim)) if said.own_primvars else here
         return prim.GetFilteredChildren(chosen), below
+
+    def _tell_of_unshown(self, instance: Usd.Prim) -> None:
+        """A layer shows what prims have inside their prototype, and not what their instances hand down."""
+        api = UsdGeom.PrimvarsAPI(instance)
+        primvars = {name: api.FindPrimvarWithInheritance(name) for name in self._memory.shown}
+        found = [name for name, primvar in primvars.items() if primvar and primvar.HasValue()]
+        self.found.report(instance, *(f"primvars:{name} is not shown of what is inside the instance" for name in found))
 
     def _stand(self, prim: Usd.Prim, above: Standing, nature: Nature, said: Said) -> Standing | None:
         """What `prim` hands down, None where it is invisible; of other than Imageables only the draw mode counts."""
