@@ -287,7 +287,7 @@ def library() -> Any:
     return document
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", [name for name in MODELS if "realitykit" not in name])  # it is Apple's own
 def test_defaults_are_those_of_the_library(library: Any, model: str) -> None:
     definition = library.getNodeDef(model)
     assert definition is not None

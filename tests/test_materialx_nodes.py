@@ -75,6 +75,23 @@ def test_an_unlit_surface_shines_and_reflects_nothing(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.emissive_color, (0.2, 0.4, 0.6), rtol=1e-6)
 
 
+def test_a_surface_of_reality_composer_is_a_preview_surface(tmp_path: Path) -> None:
+    inputs = """color3f inputs:baseColor = (0.1, 0.2, 0.3)
+        float inputs:roughness = 0.25
+        float inputs:clearcoat = 0.5
+        float inputs:specular = 0.9
+        vector3f inputs:normal.connect = </m/made.outputs:out>"""
+    image = "asset inputs:file = @wood.png@\n"
+    nodes = node("read", "ND_image_vector3", image, "vector3f outputs:out")
+    nodes += node("made", "ND_normal_map_decode", "vector3f inputs:in.connect = </m/read.outputs:out>")
+    found, lost = read(tmp_path, "ND_realitykit_pbr_surfaceshader", inputs, nodes)
+    assert (found.roughness, found.clearcoat, found.metallic) == (0.25, 0.5, 0.0)
+    np.testing.assert_allclose(found.diffuse_color, (0.1, 0.2, 0.3), rtol=1e-6)
+    normal = found.inputs["normal"]
+    assert (normal.scale[:3], normal.bias[:3]) == ((2, 2, 2), (-1, -1, -1))
+    assert lost == ["lost of ND_realitykit_pbr_surfaceshader: specular"]
+
+
 @pytest.mark.parametrize(("said", "space"), [("sRGB", "sRGB"), ("raw", "raw"), ("auto", "auto"), ("", "raw")])
 def test_a_uv_texture_may_state_its_space_as_outside_materialx(tmp_path: Path, said: str, space: str) -> None:
     stated = f'string inputs:sourceColorSpace = "{said}"' if said else ""

@@ -9,6 +9,7 @@ from pxr import UsdShade
 from defshade_cli.usd.materials.materialx.gltf import GLTF_PBR
 from defshade_cli.usd.materials.materialx.open_pbr import OPEN_PBR
 from defshade_cli.usd.materials.materialx.preview_surface import PREVIEW_SURFACE
+from defshade_cli.usd.materials.materialx.realitykit import REALITYKIT_PBR
 from defshade_cli.usd.materials.materialx.standard_surface import STANDARD_SURFACE
 from defshade_cli.usd.materials.materialx.surface import Model, Translation
 from defshade_cli.usd.materials.materialx.unlit import UNLIT
@@ -22,6 +23,7 @@ MODELS: dict[str, Model] = {
     ),
     "ND_open_pbr_surface_surfaceshader": OPEN_PBR,
     "ND_gltf_pbr_surfaceshader": GLTF_PBR,
+    "ND_realitykit_pbr_surfaceshader": REALITYKIT_PBR,
     "ND_surface_unlit": UNLIT,
 }
 

@@ -180,6 +180,7 @@ NODES: dict[str, Evaluate] = {
     "extract": _extract,
     "swizzle": _swizzle,
     "normalmap": _normal_map,
+    "normal_map_decode": _normal_map,
     "clamp": _clamp,
     "switch": _switch,
     "range": _range,

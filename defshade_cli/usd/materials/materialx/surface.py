@@ -138,10 +138,10 @@ class Translation:
         varname, fallback = (self.network.value(node, attribute) for attribute in read_as)
         return str(varname or ""), fallback if is_numbers(fallback) else None
 
-    def put_occlusion(self) -> None:
+    def put_occlusion(self, name: str = "occlusion") -> None:
         """Put the occlusion that was found beside the surface, if any."""
         if self.occlusion:
-            self.put("occlusion", self["occlusion"], "occlusion")
+            self.put("occlusion", self[name], name)
 
     def put_normal(self, name: str) -> None:
         """A normal in tangent space; a constant one that leans has no counterpart."""
