@@ -24,6 +24,8 @@ from defshade_cli.scene.light import DomeLight, Light
 from defshade_cli.scene.scene import Scene
 from defshade_cli.settings import RenderSettings
 
+pytest.importorskip("meshoptimizer")
+
 LEVEL = -7
 """A length of 0.0078 in shapes of about 1."""
 
