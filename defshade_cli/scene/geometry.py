@@ -61,13 +61,17 @@ class Mesh:
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
-        """(2, 3) least and greatest corner of the drawn points, object space; NaN points do not count."""
+        """(2, 3) least and greatest corner of the drawn points, object space; NaN points do not count.
+
+        (+inf, −inf) around nothing.
+        """
         drawn = np.zeros(len(self.points), bool)
         drawn[self.triangles] = True
-        used = self.points[drawn & np.isfinite(self.points).all(axis=1)].astype(np.float64)
-        if not len(used):
-            return np.array([[np.inf] * 3, [-np.inf] * 3])
-        return np.stack([used.min(axis=0), used.max(axis=0)])
+        axes = np.ascontiguousarray(self.points[drawn].T)
+        finite = np.isfinite(axes)
+        if not finite.all():
+            axes = axes[:, finite.all(axis=0)]
+        return np.stack([axes.min(axis=1, initial=np.inf), axes.max(axis=1, initial=-np.inf)]).astype(np.float64)
 
     @cached_property
     def radius(self) -> float:

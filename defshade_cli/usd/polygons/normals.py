@@ -146,30 +146,23 @@ def _opposed(polygons: Polygons, normals: Primvar) -> bool:
     Of a large mesh some faces are asked first: where none is in doubt, none of the others is asked.
     """
     if len(polygons.indices) > LARGEST:
-        some = _some_faces(polygons, normals)
-        assert some.normals is not None
-        along, most = _agreement(some, some.normals)
+        along, most = _agreement(polygons, normals, max(len(polygons.counts) // _ASKED_FIRST, 1))
         if (along >= _CLEAR * most).all():
             return False
     along, most = _agreement(polygons, normals)
     return bool(along.sum() < _OPPOSED * most.sum())
 
 
-def _some_faces(polygons: Polygons, normals: Primvar) -> Polygons:
-    """Every so many of the faces, with their normals."""
-    count = len(polygons.counts)
-    kept = np.arange(count) % max(count // _ASKED_FIRST, 1) == 0
-    bare = Polygons(polygons.points, polygons.counts, polygons.indices, polygons.faces, normals=normals)
-    return replace(bare, left_handed=polygons.left_handed).select(kept)
+def _agreement(polygons: Polygons, normals: Primvar, every: int = 1) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(F,) the normals of each face's corners along its outside, times twice its area; and as much as that can be.
 
-
-def _agreement(polygons: Polygons, normals: Primvar) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(F,) the normals of each face's corners along its outside, times twice its area; and as much as that can be."""
-    at_corners = polygons.at_corners(normals)
-    along, most = np.empty((2, len(polygons.counts)))
-    for faces, corners in polygons.by_size():
+    every: how many faces there are for one that is asked; 0 for the others.
+    """
+    along, most = np.zeros((2, len(polygons.counts)))
+    for block, of_block in polygons.by_size():
+        faces, corners = block[::every], of_block[::every]
         areas = _rough_areas(polygons.points[polygons.indices[corners]])
-        along[faces] = np.einsum("bi,bni->b", areas, at_corners[corners], dtype=np.float64)
+        along[faces] = np.einsum("bi,bni->b", areas, polygons.at_corners(normals, corners), dtype=np.float64)
         most[faces] = corners.shape[1] * np.sqrt(np.einsum("bi,bi->b", areas, areas))
     return -along if polygons.left_handed else along, most
 

@@ -22,6 +22,9 @@ Scheme = Literal["none", "bilinear", "catmullClark", "loop"]
 
 SCHEMES: tuple[Scheme, ...] = ("none", "bilinear", "catmullClark", "loop")
 
+EVERY = slice(None)
+"""Of the corners."""
+
 _CORNERS_AT_ONCE = 1 << 20
 _FEW_CORNERS = 256
 
@@ -237,17 +240,17 @@ class Polygons:
         corner[self.indices] = np.arange(len(self.indices))
         return corner
 
-    def at_corners(self, primvar: Primvar) -> NDArray[np.float32]:
-        """(C, ...) a primvar of any interpolation."""
+    def at_corners(self, primvar: Primvar, corners: NDArray[np.intp] | slice = EVERY) -> NDArray[np.float32]:
+        """(C, ...) a primvar of any interpolation; of corners (B, n) alone it is (B, n, ...)."""
         match primvar.interpolation:
             case "constant":
-                return np.broadcast_to(primvar.values, (len(self.indices), *primvar.values.shape[1:]))
+                return np.broadcast_to(primvar.values, (*self.indices[corners].shape, *primvar.values.shape[1:]))
             case "uniform":
-                return primvar.values[self.face_of_corner]
+                return primvar.values[self.face_of_corner[corners]]
             case "faceVarying":
-                return primvar.values
+                return primvar.values[corners]
             case _:
-                return primvar.values[self.indices]
+                return primvar.values[self.indices[corners]]
 
     def at_points(self, primvar: Primvar) -> NDArray[np.float32]:
         """(P, ...) a primvar that does not split points."""

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from defshade_cli.spaces import cross
 from defshade_cli.usd.polygons.normals import vector_areas
 from defshade_cli.usd.polygons.polygons import Polygons
 
@@ -47,26 +46,29 @@ def _cut(points: NDArray[np.float32], indices: NDArray[Any]) -> NDArray[np.intp]
         case 3:
             return np.arange(3)[None, None]
         case 4:
-            folded = _folded(points[indices].astype(np.float64))
+            folded = _folded(points, indices)
+            if not folded.any():
+                return _CUT_02[None]
             return np.where(folded[:, None, None], _CUT_13, _CUT_02)
         case _:
             return _cut_large(points[indices].astype(np.float64))
 
 
-def _folded(quads: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Do the triangles beside diagonal 0–2 of quads (B, 4, 3) face apart, more so than those beside 1–3?"""
-    a, b, c, d = quads.swapaxes(0, 1)
+def _folded(points: NDArray[np.float32], quads: NDArray[Any]) -> NDArray[np.bool_]:
+    """Do the triangles beside diagonal 0–2 of quads (B, 4) face apart, more so than those beside 1–3?"""
+    a, b, c, d = (np.ascontiguousarray(points.take(corner, axis=0).T, np.float64) for corner in quads.T)
     folded = _agreement(a, b, c, d) <= 0.0
     if not folded.any():
         return folded
-    a, b, c, d = quads[folded].swapaxes(0, 1)
+    a, b, c, d = (corner[:, folded] for corner in (a, b, c, d))
     folded[folded] = _agreement(b, c, d, a) > _agreement(a, b, c, d)
     return folded
 
 
 def _agreement(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any], d: NDArray[Any]) -> NDArray[np.float64]:
-    """(B,) the product of the normals of triangles abc and acd, areas included."""
-    return np.einsum("bi,bi->b", cross(b - a, c - a), cross(c - a, d - a))
+    """(B,) the product of the normals of triangles abc and acd, areas included. Points are (3, B), each axis a row."""
+    (x, y, z), (u, v, w), (p, q, r) = b - a, c - a, d - a
+    return (y * w - z * v) * (v * r - w * q) + (z * u - x * w) * (w * p - u * r) + (x * v - y * u) * (u * q - v * p)
 
 
 def _cut_large(corners: NDArray[np.float64]) -> NDArray[np.intp]:
