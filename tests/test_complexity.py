@@ -11,13 +11,21 @@ from pxr import Usd
 import stages
 from build import at, camera
 from defshade_cli.plan import make_plan
+from defshade_cli.scene.closed import is_closed
 from defshade_cli.scene.scene import Scene
 from defshade_cli.scene.view import View
 from defshade_cli.settings import COMPLEXITIES, RenderSettings
+from defshade_cli.usd.gprims.revolution import SEGMENTS
 from defshade_cli.usd.polygons.flatness import rises
 from defshade_cli.usd.surfaces import complexity
-from defshade_cli.usd.surfaces.complexity import EDGE_PIXELS, FINEST_LEVEL, FLAT_PIXELS, choose_levels
-from defshade_cli.usd.surfaces.geometry import Surface, read_surface
+from defshade_cli.usd.surfaces.complexity import (
+    EDGE_PIXELS,
+    FEWEST_SEGMENTS,
+    FINEST_LEVEL,
+    FLAT_PIXELS,
+    choose_levels,
+)
+from defshade_cli.usd.surfaces.geometry import Surface, read_surface, tessellate
 from prims import define_cube, define_mesh
 from stages import move
 
@@ -138,3 +146,71 @@ def test_stages_are_refined_by_the_image_that_is_asked_for() -> None:
 def test_our_camera_frames_the_same_however_fine_the_surface_is() -> None:
     frames = [stages.read(BALL.replace("MOVE", ""), complexity=name).camera for name in COMPLEXITIES]
     assert all(np.array_equal(frame.world_from_camera, frames[0].world_from_camera) for frame in frames)
+
+
+# Solids
+
+SOLIDS = {
+    "Sphere": "double radius = 1",
+    "Cylinder": 'double radius = 1\ndouble height = 4\ntoken axis = "X"',
+    "Cone": 'double radius = 1\ndouble height = 2\ntoken axis = "Z"',
+    "Capsule": 'double radius = 1\ndouble height = 2\ntoken axis = "Y"',
+}
+
+
+def solid(kind: str) -> Surface:
+    stage = stages.stage_of(f'def {kind} "solid" {{\n{SOLIDS[kind]}\n}}')
+    surface = read_surface(stage.GetPrimAtPath("/solid"), Usd.TimeCode.Default())
+    assert surface is not None
+    return surface
+
+
+@pytest.mark.parametrize("kind", SOLIDS)
+@pytest.mark.parametrize("height", [1, 10, 40, 200, 1000, 4000])
+def test_many_solids_are_as_round_as_can_be_seen(kind: str, height: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A circle is r (1 - cos(pi / n)) from its polygon: within FLAT_PIXELS, and half as many sides would be beyond."""
+    monkeypatch.setattr(complexity, "MANY_TRIANGLES", 0)
+    surface = solid(kind)
+    level = choose_levels([(surface, at(0, 0, -95)[None])], "auto", view(height))[surface]
+    nearest = 100.0 - surface.polygons.bounds[1, 2]
+    segments, radius = SEGMENTS >> -level, height / nearest
+    assert radius * (1.0 - math.cos(math.pi / segments)) <= FLAT_PIXELS or segments == SEGMENTS
+    assert radius * (1.0 - math.cos(2.0 * math.pi / segments)) > FLAT_PIXELS or segments == FEWEST_SEGMENTS
+
+
+@pytest.mark.parametrize("kind", SOLIDS)
+def test_a_coarse_solid_has_its_corners_on_the_round_one(kind: str) -> None:
+    surface = solid(kind)
+    fine, coarse = tessellate(surface).mesh, tessellate(surface, level=-2).mesh
+    assert coarse.level == -2 and fine.level is None
+    assert 2 * len(coarse.triangles) < len(fine.triangles)
+    np.testing.assert_allclose(coarse.bounds, fine.bounds, atol=1e-6)
+    apart = np.linalg.norm(coarse.points[:, None] - fine.points[None], axis=-1).min(axis=1)
+    assert apart.max() < 1e-5
+    assert is_closed(coarse.points, coarse.triangles)
+
+
+def test_few_solids_and_those_that_shine_are_round(monkeypatch: pytest.MonkeyPatch) -> None:
+    far = [(solid("Sphere"), at(0, 0, -900)[None])]
+    assert set(choose_levels(far, "auto", view()).values()) == {0}
+    monkeypatch.setattr(complexity, "MANY_TRIANGLES", 0)
+    assert set(choose_levels(far, "auto", view()).values()) == {-3}
+    assert set(choose_levels(far, "auto", view(), {"/solid"}).values()) == {0}
+    assert set(choose_levels(far, "medium", view()).values()) == {0}
+
+
+def test_a_crowd_of_solids_takes_few_triangles_and_keeps_its_colour() -> None:
+    places = ", ".join(f"({x}, {y}, 0)" for x in range(0, 60, 3) for y in range(0, 60, 3))
+    ball = 'def Sphere "ball" {\ncolor3f[] primvars:displayColor = [(0.1, 0.2, 0.3)]\n}'
+    text = f"""def PointInstancer "crowd" {{
+        rel prototypes = </crowd/ball>
+        int[] protoIndices = {[0] * 400}
+        point3f[] positions = [{places}]
+        {ball}
+    }}
+    """
+    scene = stages.read(text, size=(96, 54))
+    assert scene.triangle_count == 400 * (FEWEST_SEGMENTS * (FEWEST_SEGMENTS // 2 - 1) * 2)
+    np.testing.assert_allclose(scene.drawables[0].display_color, np.tile([0.1, 0.2, 0.3], (400, 1)), rtol=1e-6)
+    (said,) = (d for d in make_plan(scene, RenderSettings()).decisions if d.subject == "coarse solids")
+    assert said.choice == "1 meshes"

@@ -39,6 +39,7 @@ def _of_planes(plan: Plan) -> Iterator[Decision]:
     converted = "authored colours are converted to it"
     yield Decision("render space", plan.render_space.name, "as authored" if plan.render_space.is_rec709 else converted)
     yield _explain_subdivision(plan)
+    yield _explain_solids(plan)
     for plane in PLANES:
         kept = plane in plan.planes or plane in plan.data_planes
         yield _kept(f"plane {plane.name}", kept, "a material or layer needs it", "nothing needs it")
@@ -131,6 +132,12 @@ def _explain_subdivision(plan: Plan) -> Decision:
     levels = f"{least} levels" if least == most else f"{least} to {most} levels"
     reason = "by the surfaces' size in the image" if plan.complexity == "auto" else f"complexity {plan.complexity}"
     return Decision("subdivision", levels, reason)
+
+
+def _explain_solids(plan: Plan) -> Decision:
+    if not plan.coarse_solids:
+        return Decision("coarse solids", "none", "none, or large in the image, or too few to count")
+    return Decision("coarse solids", f"{plan.coarse_solids} meshes", "small in the image, and many")
 
 
 def _explain_motion(plan: Plan) -> Decision:

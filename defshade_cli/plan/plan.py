@@ -40,6 +40,7 @@ class Plan(LightPlan):
     texels: of each texture that is read, a side that it is worth, see plan/texels.py.
     data_pass: data layers need an unjittered float GBuffer of their own.
     levels: how often subdivision surfaces were refined, ascending; empty without any.
+    coarse_solids: meshes of solids that have fewer segments, since they are small in the image.
     ranks: (id, coverage) pairs of a Cryptomatte.
     debug: of RenderSettings.
     redrawing: what the frame before leaves to draw.
@@ -69,6 +70,7 @@ class Plan(LightPlan):
     data_pass: bool
     complexity: Complexity
     levels: tuple[int, ...]
+    coarse_solids: int
     ranks: int
     debug: Debug | None = None
     redrawing: Redrawing = WHOLE

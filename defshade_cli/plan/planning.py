@@ -90,7 +90,8 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         ranks=settings.cryptomatte_levels,
         debug=settings.debug,
         portals=len(scene.portals),
-        levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None})),
+        levels=tuple(sorted({mesh.level for mesh in scene.meshes if mesh.level is not None and mesh.level >= 0})),
+        coarse_solids=sum(mesh.level is not None and mesh.level < 0 for mesh in scene.meshes),
     )
 
 

@@ -29,7 +29,7 @@ class Mesh:
     double_sided: as authored. Both sides are drawn either way.
     primvars: name → (V, 1 to 4) float32, those that only layers show.
     uvs: primvar name → (V, 2) float32 texture coordinates, (0, 0) at the lower left of an image.
-    level: how often a subdivision surface was refined; None for what is no such surface.
+    level: how often a subdivision surface was refined, below 0 how often a solid was made coarser; None for others.
     """
 
     path: str

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import cycle
@@ -135,7 +135,7 @@ class StageReader:
         camera, camera_issues = self._sight.camera(frame, time, placed, self._placed_at)
         view = self._sight.view(camera)
         drawn = tuple(faced(drawn, view, UNIFORM_LEVELS.get(self._options.complexity)))
-        gprims = self._tessellate(drawn, view, levels)
+        gprims = self._tessellate(drawn, view, levels, traversal.found.glows)
         palette = Palette(self._memory.materials, time, self._settings.material_purposes)
         meshes: dict[Mesh, int] = {}
         glowing = glowing_surfaces(drawn, gprims, traversal.found.glows, palette)
@@ -206,9 +206,11 @@ class StageReader:
         self._lights = {light.path: light for light in found}
         return found
 
-    def _tessellate(self, drawn: Iterable[PlacedSurface], view: View, levels: dict[str, int]) -> dict[Surface, Gprim]:
+    def _tessellate(
+        self, drawn: Iterable[PlacedSurface], view: View, levels: dict[str, int], shining: Container[str]
+    ) -> dict[Surface, Gprim]:
         placed = ((surface, piece.root_from_object) for piece, surface in drawn)
-        chosen = choose_levels(placed, self._options.complexity, view)
+        chosen = choose_levels(placed, self._options.complexity, view, shining)
         return self._tessellation.at_levels(
             {surface: levels.setdefault(surface.path, level) for surface, level in chosen.items()}
         )

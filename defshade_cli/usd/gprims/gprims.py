@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd
 
+from defshade_cli.dataclass import dataclass
 from defshade_cli.usd.gprims.cages import capsule_cage, cone_cage, frustum_cage, sphere_cage
 from defshade_cli.usd.gprims.revolution import SEGMENTS, Strip, arc, disk, revolve, side
 from defshade_cli.usd.polygons.lying import sound_carried
@@ -52,18 +53,18 @@ def sphere(radius: float, segments: int = SEGMENTS) -> Polygons:
     return revolve([arc(radius, 0.0, -math.pi / 2, math.pi / 2, segments)], segments)
 
 
-def frustum(height: float, top: float, bottom: float) -> Polygons:
+def frustum(height: float, top: float, bottom: float, segments: int = SEGMENTS) -> Polygons:
     """A cylinder of two radii, with its caps."""
     half = 0.5 * height
-    return revolve([disk(bottom, -half, -1), side(bottom, top, height), disk(top, half, 1)])
+    return revolve([disk(bottom, -half, -1), side(bottom, top, height), disk(top, half, 1)], segments)
 
 
-def cone(height: float, radius: float) -> Polygons:
+def cone(height: float, radius: float, segments: int = SEGMENTS) -> Polygons:
     """A UsdGeomCone along z as polygons, its tip up. height, radius: in scene units."""
-    return frustum(height, 0.0, radius)
+    return frustum(height, 0.0, radius, segments)
 
 
-def capsule(height: float, top: float, bottom: float) -> Polygons:
+def capsule(height: float, top: float, bottom: float, segments: int = SEGMENTS) -> Polygons:
     """A frustum's mantle, continued smoothly by a sphere at each end.
 
     The radii are those of the rings where mantle and spheres meet, `height` apart, as in the extent that
@@ -72,13 +73,13 @@ def capsule(height: float, top: float, bottom: float) -> Polygons:
     """
     slope = (bottom - top) / height if height else 0.0
     meet, stretch = math.atan(slope), math.hypot(1.0, slope)
-    lower = arc(bottom * stretch, -0.5 * height - slope * bottom, -math.pi / 2, meet)
-    upper = arc(top * stretch, 0.5 * height - slope * top, meet, math.pi / 2)
+    lower = arc(bottom * stretch, -0.5 * height - slope * bottom, -math.pi / 2, meet, segments)
+    upper = arc(top * stretch, 0.5 * height - slope * top, meet, math.pi / 2, segments)
     profile = Strip(
         np.concatenate([lower.points, upper.points]),
         np.concatenate([lower.normals, upper.normals]),
     )
-    return revolve([profile])
+    return revolve([profile], segments)
 
 
 _GPRIMS: dict[str, tuple[Callable[..., Polygons], tuple[str, ...]]] = {
@@ -101,6 +102,20 @@ _CAGES: dict[Callable[..., Polygons], Callable[..., Polygons]] = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """What a solid of revolution is made from. sizes: of what `build` takes.  segments: around."""
+
+    build: Callable[..., Polygons]
+    axis: str
+    sizes: tuple[float, ...]
+    segments: int = SEGMENTS
+
+    def polygons(self, halvings: int = 0) -> Polygons:
+        """With half as many segments again and again."""
+        return _round(self.build, self.axis, self.sizes, self.segments >> halvings)
+
+
 def size_attributes(prim: Usd.Prim) -> tuple[str, ...]:
     """What is read of a gprim and may vary over time, besides primvars; nothing for other types."""
     _, names = _GPRIMS.get(prim.GetTypeName(), (None, ()))
@@ -109,10 +124,10 @@ def size_attributes(prim: Usd.Prim) -> tuple[str, ...]:
 
 def read_solid(
     prim: Usd.Prim, said: Said, time: Usd.TimeCode, issues: list[str], color: str, *, as_cage: bool
-) -> Polygons | None:
-    """The gprim tessellated; None for any other type, no faces where a size is no size.
+) -> tuple[Polygons, Solid | None] | None:
+    """The gprim tessellated, and what it is made from if it is round; None for any other type.
 
-    as_cage: a curved solid is the cage that Hydra subdivides.
+    as_cage: a curved solid is the cage that Hydra subdivides. No faces where a size is no size.
     """
     build, names = _GPRIMS.get(said.type_name, (None, ()))
     if build is None:
@@ -121,20 +136,26 @@ def read_solid(
     axis = _axis(prim, issues) if "axis" in said.names else "Z"
     if build is plane and axis != "Z":
         names = names[::-1]  # length comes first in cyclic order, by the schema's table of axes
-    sizes = [_size(prim, name, time, issues) for name in names]
-    polygons = _built(build, axis, tuple(sizes))
+    sizes = [size for name in names if (size := _size(prim, name, time, issues)) is not None]
+    solid = Solid(build, axis, tuple(sizes)) if build in _CAGES and len(sizes) == len(names) else None
+    polygons = solid.polygons() if solid else _built(build, axis, tuple(sizes), len(names))
     if not said.primvars:
-        return polygons
+        return polygons, solid
     elements = _elements(polygons)
     carried = sound_carried(said, time, color, elements) or read_carried(prim, time, elements, issues, color)
-    return carried.laid_on(polygons)
+    return carried.laid_on(polygons), solid
 
 
 @lru_cache(maxsize=_MOST_KEPT)
-def _built(build: Callable[..., Polygons], axis: str, sizes: tuple[float | None, ...]) -> Polygons:
-    """The same object for the same solid: a stage may hold thousands."""
-    solid = _quads(np.empty((0, 3)), np.empty((0, 4), int)) if None in sizes else build(*sizes)
+def _built(build: Callable[..., Polygons], axis: str, sizes: tuple[float, ...], count: int) -> Polygons:
+    """The same object for the same solid: a stage may hold thousands. Nothing for fewer sizes than `count`."""
+    solid = build(*sizes) if len(sizes) == count else _quads(np.empty((0, 3)), np.empty((0, 4), int))
     return _along(solid, _SPINE[axis])
+
+
+@lru_cache(maxsize=_MOST_KEPT)
+def _round(build: Callable[..., Polygons], axis: str, sizes: tuple[float, ...], segments: int) -> Polygons:
+    return _along(build(*sizes, segments=segments), _SPINE[axis])
 
 
 def _elements(polygons: Polygons) -> Elements:

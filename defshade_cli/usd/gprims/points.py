@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
 from defshade_cli.usd.gprims.copies import Copies
-from defshade_cli.usd.gprims.gprims import sphere
+from defshade_cli.usd.gprims.gprims import Solid, sphere
 from defshade_cli.usd.gprims.revolution import disk, revolve
 from defshade_cli.usd.polygons.polygons import Polygons, Primvar
 from defshade_cli.usd.polygons.positions import read_positions
@@ -37,7 +37,7 @@ _FEWEST_SEGMENTS = 8
 
 def read_points(
     points: UsdGeom.Points, time: Usd.TimeCode, issues: list[str], color: str = DISPLAY_COLOR, *, as_disks: bool
-) -> tuple[Polygons, Copies]:
+) -> tuple[Polygons, Copies, Solid | None]:
     """A sphere or a disk of diameter 1, and the points that it is placed at: all that are finite."""
     positions = read_positions(points.GetPrim(), time)
     if positions is None or not len(positions):
@@ -47,7 +47,10 @@ def read_points(
         issues.append("normals of points are ignored: spheres are drawn")
     copies = _copies(points, positions, time, issues, color)
     segments = _segments(len(copies.ids))
-    return revolve([disk(0.5, 0.0, 1)], 2 * segments) if as_disks else sphere(0.5, segments), copies
+    if as_disks:
+        return revolve([disk(0.5, 0.0, 1)], 2 * segments), copies, None
+    ball = Solid(sphere, "Z", (0.5,), segments)
+    return ball.polygons(), copies, ball
 
 
 def find_widths(prim: Usd.Prim, time: Usd.TimeCode, elements: Elements, issues: list[str]) -> Primvar | None:

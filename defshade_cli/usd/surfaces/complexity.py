@@ -4,13 +4,16 @@ Refined once, an edge is half as long, and the polygons are a quarter as far fro
 surface, as it may appear where its nearest instance is closest to the eye, until its edges are no longer than
 EDGE_PIXELS or it is nearer than FLAT_PIXELS. What is out of sight counts too, because it casts shadows. Where all that
 would make more than TRIANGLE_BUDGET triangles, the surfaces that are farthest from their polygons go first.
+
+Solids are round to begin with. Where there are so many of them that it counts, those that are small in the picture get
+half as many segments again and again, a level below 0 each time, as long as they are off by less than FLAT_PIXELS.
 """
 
 from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,22 +34,52 @@ FINEST_LEVEL = 5
 TRIANGLE_BUDGET = 2_000_000
 """Of all subdivision surfaces together, each counted once however often it is placed."""
 
+MANY_TRIANGLES = 500_000
+"""Of all solids together, each counted as often as it is placed: up to so many, all are as round as can be."""
+
+FEWEST_SEGMENTS = 8
+"""Around a solid."""
+
+Placed = tuple[Surface, NDArray[np.float64]]
+"""A surface and its world_from_object (N, 4, 4)."""
+
 
 def choose_levels(
-    placed: Iterable[tuple[Surface, NDArray[np.float64]]], complexity: Complexity, view: View
+    placed: Iterable[Placed], complexity: Complexity, view: View, shining: Container[str] = ()
 ) -> dict[Surface, int]:
-    """The level of each surface that `placed` gives with its world_from_object (N, 4, 4); 0 for polygons."""
+    """The level of each surface, 0 for polygons. shining: paths of surfaces whose areas count as light."""
     if complexity != "auto":
         return {s: UNIFORM_LEVELS[complexity] if s.control else 0 for s, _ in placed}
     listed = list(placed)
     nearest = dict.fromkeys([surface for surface, _ in listed], 0.0)
-    curved = [(surface, matrices) for surface, matrices in listed if surface.control and len(matrices)]
-    for (surface, _), pixels in zip(curved, _pixels_per_unit(curved, view), strict=True):
-        nearest[surface] = max(pixels, nearest[surface])
-    return _levels_in_budget(nearest)
+    nearest |= _nearest([(surface, matrices) for surface, matrices in listed if surface.control], view)
+    solids = [(s, m) for s, m in listed if s.solid and s.faces.group is None and s.path not in shining]
+    return _levels_in_budget(nearest) | _levels_of_solids(solids, view)
 
 
-def _pixels_per_unit(placed: Sequence[tuple[Surface, NDArray[np.float64]]], view: View) -> list[float]:
+def _levels_of_solids(placed: Sequence[Placed], view: View) -> dict[Surface, int]:
+    """None where they are few. A circle of radius r lies r (1 - cos(pi / n)) outside of its polygon of n corners."""
+    if sum(2 * len(surface.polygons.counts) * len(matrices) for surface, matrices in placed) <= MANY_TRIANGLES:
+        return {}
+    levels = {}
+    for surface, pixels in _nearest(placed, view).items():
+        assert surface.solid is not None
+        radius = 0.5 * pixels * float(np.median(np.diff(surface.polygons.bounds, axis=0)))
+        enough = math.pi / math.acos(1.0 - min(FLAT_PIXELS / max(radius, FLAT_PIXELS), 1.0))
+        levels[surface] = -int(math.log2(max(surface.solid.segments / max(enough, FEWEST_SEGMENTS), 1.0)))
+    return levels
+
+
+def _nearest(placed: Sequence[Placed], view: View) -> dict[Surface, float]:
+    """How large an object-space unit of each may appear in the nearest of its instances; not of what has none."""
+    shown = [(surface, matrices) for surface, matrices in placed if len(matrices)]
+    nearest: dict[Surface, float] = {}
+    for (surface, _), pixels in zip(shown, _pixels_per_unit(shown, view), strict=True):
+        nearest[surface] = max(pixels, nearest.get(surface, 0.0))
+    return nearest
+
+
+def _pixels_per_unit(placed: Sequence[Placed], view: View) -> list[float]:
     """How large an object-space unit of each may appear in the nearest of its instances."""
     if not placed:
         return []

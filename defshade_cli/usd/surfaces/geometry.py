@@ -20,6 +20,7 @@ from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.geometry import Mesh
 from defshade_cli.scene.scene import Unsupported
 from defshade_cli.usd.gprims.copies import Copies
+from defshade_cli.usd.gprims.gprims import Solid
 from defshade_cli.usd.polygons.control import Control, read_control, smooth_control
 from defshade_cli.usd.polygons.cut import Cut, cut
 from defshade_cli.usd.polygons.normals import with_normals
@@ -58,6 +59,7 @@ class Surface:
     groups: paths of the material groups that have faces to draw, in order.
     issues: what was left out or mended of this prim, and why.
     strands: of curves, from which the polygons follow, or others that face the image.
+    solid: what the polygons are of, if that is round.
     """
 
     path: str
@@ -71,6 +73,7 @@ class Surface:
     display_opacity: float | None
     issues: tuple[Unsupported, ...]
     strands: Strands | None = None
+    solid: Solid | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -128,7 +131,7 @@ def surface_of(
     issues: list[str],
 ) -> Surface:
     """Of a prim whose shape is known; arguments as of read_surface. issues: what is said of it already."""
-    path, (polygons, copies, strands) = said.path, shape
+    path, (polygons, copies, solid, strands) = said.path, shape
     display_color, opacity = _constant(polygons.display_color), _constant(polygons.display_opacity)
     if shapes is not None:
         polygons = shapes.shared(polygons.without_constants())
@@ -147,6 +150,7 @@ def surface_of(
         display_opacity=None if opacity is None else float(opacity),
         issues=tuple([Unsupported(path, issue) for issue in issues]),
         strands=strands,
+        solid=solid,
     )
 
 
@@ -164,7 +168,7 @@ def tessellate(
     *,
     level: int = 0,
 ) -> Gprim:
-    """The surface in triangles; without a refiner its cage.
+    """The surface in triangles; without a refiner its cage, and a solid as coarse as its level says.
 
     last: an earlier one, of which is kept what fits.
     shaped: what is known of it, refined `level` times, and then taken whole.
@@ -172,15 +176,25 @@ def tessellate(
     if shaped:
         refined, last = shaped.polygons, None
     else:
-        refined = with_normals(refiner.refine(surface.polygons) if refiner else surface.polygons)
+        refined = with_normals(refiner.refine(surface.polygons) if refiner else _coarse(surface, -min(level, 0)))
     polygons = shared(refined, last.cut.polygons) if last else refined
-    sides, refined_to = surface.double_sided, (refiner.level if refiner else level) if surface.control else None
+    is_refined = surface.control is not None or level < 0
+    sides, refined_to = surface.double_sided, (refiner.level if refiner else level) if is_refined else None
     known = last.cut.moved(polygons, surface.faces) if last else None
     made = known or cut(polygons, surface.faces, surface.path, shaped, double_sided=sides, level=refined_to)
     mesh = made.mesh
     if (mesh.double_sided, mesh.level) != (sides, refined_to):
         mesh = replace(mesh, double_sided=sides, level=refined_to)
     return Gprim(mesh, made.groups, tuple([Unsupported(surface.path, issue) for issue in made.issues]), made)
+
+
+def _coarse(surface: Surface, halvings: int) -> Polygons:
+    """Its polygons; of a solid with fewer segments, and what is the same all over it."""
+    if not halvings or not surface.solid:
+        return surface.polygons
+    solid = surface.solid.polygons(halvings)
+    shape = {name: getattr(solid, name) for name in ("points", "counts", "indices", "faces", "normals")}
+    return replace(surface.polygons, **shape)
 
 
 def move_surface(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from pxr import Usd, UsdGeom
 
 from defshade_cli.usd.gprims.copies import Copies
-from defshade_cli.usd.gprims.gprims import read_solid, size_attributes
+from defshade_cli.usd.gprims.gprims import Solid, read_solid, size_attributes
 from defshade_cli.usd.polygons.control import CONTROL_ATTRIBUTES
 from defshade_cli.usd.polygons.mesh import MESH_ATTRIBUTES, read_mesh
 from defshade_cli.usd.polygons.polygons import Polygons
@@ -21,10 +21,11 @@ if TYPE_CHECKING:
 
 
 class Shape(NamedTuple):
-    """What a prim is before its materials count; copies and strands as in Surface."""
+    """What a prim is before its materials count; copies, solid and strands as in Surface."""
 
     polygons: Polygons
     copies: Copies | None = None
+    solid: Solid | None = None
     strands: Strands | None = None
 
 
@@ -34,7 +35,7 @@ def read_shape(
     """None for a type that is no supported surface."""
     solid = read_solid(prim, said, time, issues, color, as_cage=as_cages)
     if solid is not None:
-        return Shape(solid)
+        return Shape(solid[0], solid=solid[1])
     if said.type_name == "Mesh" or prim.IsA(UsdGeom.Mesh):
         return Shape(read_mesh(prim, said, time, issues, color))
     if prim.IsA(UsdGeom.Points):
