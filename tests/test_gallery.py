@@ -15,8 +15,8 @@ from defshade_cli.resources import SCENES
 from defshade_cli.settings import RenderSettings
 
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
-OTHERS = {"view.png", "accuracy.svg"}
-"""Drawn by a browser, and by make accuracy."""
+OTHERS = {"view.png", "accuracy.svg", "lights.svg"}
+"""Drawn by a browser, by make accuracy, and by benchmarks/lights.py."""
 
 
 def test_every_figure_is_drawn_by_make_gallery() -> None:
