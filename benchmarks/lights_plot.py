@@ -10,7 +10,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from defshade_cli.measure.axes import HEIGHT, MARGIN, OPENING, WIDTH, Axis, grid, legend, text
+from defshade_cli.measure.axes import HEIGHT, MARGIN, WIDTH, Axis, chart, legend, points
 from defshade_cli.measure.sections import generated
 
 _WAYS = {"volumes": "#27519c", "tiles": "#c1440e", "whole image": "#2a7f62"}
@@ -35,22 +35,13 @@ def lights_plot(seconds: Seconds) -> str:
     y = Axis.around([each for row in seconds.values() for each in row.values()], HEIGHT - MARGIN, 52.0)
     first, least = min(seconds["tiles"].items())
     times = 10.0**y.high / least
-    fair = _points({first: least, first * times: least * times}, x, y)
+    fair = points({first: least, first * times: least * times}, x, y)
     lines = [
-        *OPENING,
-        *grid(x, y),
-        text((x.first + x.last) / 2, HEIGHT - 20, "lights", "middle"),
-        text(12, 34, "CPU-seconds"),
         f'<polyline class="front" points="{fair}"/>',
-        *(f'<polyline points="{_points(row, x, y)}" stroke="{_WAYS[way]}"/>' for way, row in seconds.items()),
+        *(f'<polyline points="{points(row, x, y)}" stroke="{_WAYS[way]}"/>' for way, row in seconds.items()),
         *legend(_WAYS),
-        "</svg>",
     ]
-    return "\n".join(lines) + "\n"
-
-
-def _points(row: Mapping[int, float] | Mapping[float, float], x: Axis, y: Axis) -> str:
-    return " ".join(f"{x.at(count):.1f},{y.at(value):.1f}" for count, value in row.items())
+    return chart(x, y, "lights", "CPU-seconds", lines)
 
 
 def draw_plot(page: Path) -> None:

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from defshade_cli.measure.axes import HEIGHT, MARGIN, OPENING, WIDTH, Axis, grid, legend, text
+from defshade_cli.measure.axes import HEIGHT, MARGIN, WIDTH, Axis, chart, legend, points
 from defshade_cli.measure.sections import generated
 
 _SAMPLES = (1, 16, 256)
@@ -34,25 +34,19 @@ def accuracy_plot(errors: Errors) -> str:
     """An SVG document; dashes rise where relMSE halves as samples double, ticks are the bounds."""
     x = Axis.around(_SAMPLES, MARGIN, WIDTH - 24.0)
     y = Axis.around([each for row in errors.values() for each in row.values()], HEIGHT - MARGIN, 52.0)
-    fair = f"{x.at(1):.1f},{y.at(1e-2):.1f} {x.at(256):.1f},{y.at(1e-2 / 256):.1f}"
     lines = [
-        *OPENING,
-        *grid(x, y),
-        text((x.first + x.last) / 2, HEIGHT - 20, "samples a pixel", "middle"),
-        text(12, 34, "relMSE"),
-        f'<polyline class="front" points="{fair}"/>',
+        f'<polyline class="front" points="{points({1: 1e-2, 256: 1e-2 / 256}, x, y)}"/>',
         *(_line(stage, row, x, y) for stage, row in errors.items()),
         *(_bound(x.at(count), y.at(bound)) for count, bound in _BOUNDS.items()),
         *legend(dict(_FAMILIES.values())),
-        "</svg>",
     ]
-    return "\n".join(lines) + "\n"
+    return chart(x, y, "samples a pixel", "relMSE", lines)
 
 
 def _line(stage: str, row: Mapping[int, float], x: Axis, y: Axis) -> str:
     _, color = next(family for start, family in _FAMILIES.items() if stage.startswith(start))
-    points = " ".join(f"{x.at(count):.1f},{y.at(error):.1f}" for count, error in row.items())
-    return f'<polyline points="{points}" stroke="{color}" stroke-opacity="0.7"><title>{stage}</title></polyline>'
+    line = points(row, x, y)
+    return f'<polyline points="{line}" stroke="{color}" stroke-opacity="0.7"><title>{stage}</title></polyline>'
 
 
 def _bound(x: float, y: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 
 from defshade_cli.dataclass import dataclass
@@ -57,6 +57,17 @@ def grid(x: Axis, y: Axis) -> Iterator[str]:
         at = y.at(tick)
         yield f'<line class="grid" x1="{x.first}" x2="{x.last}" y1="{at:.1f}" y2="{at:.1f}"/>'
         yield text(x.first - 6, at + 4, f"{tick:g}", "end")
+
+
+def chart(x: Axis, y: Axis, across: str, up: str, drawn: Iterable[str]) -> str:
+    """A document: the grid, what its axes are, and what is drawn in it."""
+    titles = text((x.first + x.last) / 2, HEIGHT - 20, across, "middle"), text(12, 34, up)
+    return "\n".join([*OPENING, *grid(x, y), *titles, *drawn, "</svg>"]) + "\n"
+
+
+def points(values: Mapping[int, float] | Mapping[float, float], x: Axis, y: Axis) -> str:
+    """A line through (x, y) as SVG lists its points."""
+    return " ".join(f"{x.at(across):.1f},{y.at(up):.1f}" for across, up in values.items())
 
 
 def legend(colors: Mapping[str, str]) -> Iterator[str]:

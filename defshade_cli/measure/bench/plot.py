@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from html import escape
 
-from defshade_cli.measure.axes import HEIGHT, MARGIN, OPENING, WIDTH, Axis, grid, text
+from defshade_cli.measure.axes import HEIGHT, MARGIN, WIDTH, Axis, chart, text
 from defshade_cli.measure.bench.front import pareto_front
 from defshade_cli.measure.bench.sweep import Bench
 from defshade_cli.measure.bench.trial import Cost, Trial
@@ -24,17 +24,12 @@ def plot(bench: Bench, cost: Cost) -> str:
     front = " ".join(f"{x.at(t.cost(cost)):.1f},{y.at(_error(t)):.1f}" for t in pareto_front(bench.trials, cost))
     width, height = bench.size
     lines = [
-        *OPENING,
         text(MARGIN, 22, f"{bench.stage.name}, {width}x{height}, {bench.device}"),
-        *grid(x, y),
-        text((x.first + x.last) / 2, HEIGHT - 20, _TITLES[cost], "middle"),
-        text(12, 34, "relMSE"),
         f'<polyline class="front" points="{front}"/>',
         *(_dot(trial, x.at(trial.cost(cost)), y.at(_error(trial))) for trial in bench.trials),
         *_legend(bench),
-        "</svg>",
     ]
-    return "\n".join(lines) + "\n"
+    return chart(x, y, _TITLES[cost], "relMSE", lines)
 
 
 def _error(trial: Trial) -> float:
