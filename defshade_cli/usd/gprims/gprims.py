@@ -104,16 +104,16 @@ _CAGES: dict[Callable[..., Polygons], Callable[..., Polygons]] = {
 
 @dataclass(frozen=True, slots=True)
 class Solid:
-    """What a solid of revolution is made from. sizes: of what `build` takes.  segments: around."""
+    """What a solid of revolution is made from. sizes: what `build` takes, as _built has them.  segments: around."""
 
     build: Callable[..., Polygons]
     axis: str
-    sizes: tuple[float, ...]
+    sizes: tuple[float | None, ...]
     segments: int = SEGMENTS
 
     def polygons(self, halvings: int = 0) -> Polygons:
         """With half as many segments again and again."""
-        return _round(self.build, self.axis, self.sizes, self.segments >> halvings)
+        return _built(self.build, self.axis, self.sizes, self.segments >> halvings)
 
 
 def size_attributes(prim: Usd.Prim) -> tuple[str, ...]:
@@ -136,9 +136,9 @@ def read_solid(
     axis = _axis(prim, issues) if "axis" in said.names else "Z"
     if build is plane and axis != "Z":
         names = names[::-1]  # length comes first in cyclic order, by the schema's table of axes
-    sizes = [size for name in names if (size := _size(prim, name, time, issues)) is not None]
-    solid = Solid(build, axis, tuple(sizes)) if build in _CAGES and len(sizes) == len(names) else None
-    polygons = solid.polygons() if solid else _built(build, axis, tuple(sizes), len(names))
+    sizes = tuple([_size(prim, name, time, issues) for name in names])
+    solid = Solid(build, axis, sizes) if build in _CAGES else None
+    polygons = solid.polygons() if solid else _built(build, axis, sizes)
     if not said.primvars:
         return polygons, solid
     elements = _elements(polygons)
@@ -147,15 +147,10 @@ def read_solid(
 
 
 @lru_cache(maxsize=_MOST_KEPT)
-def _built(build: Callable[..., Polygons], axis: str, sizes: tuple[float, ...], count: int) -> Polygons:
-    """The same object for the same solid: a stage may hold thousands. Nothing for fewer sizes than `count`."""
-    solid = build(*sizes) if len(sizes) == count else _quads(np.empty((0, 3)), np.empty((0, 4), int))
+def _built(build: Callable[..., Polygons], axis: str, sizes: tuple[float | None, ...], *segments: int) -> Polygons:
+    """The same object for the same solid: a stage may hold thousands. segments: around a round one."""
+    solid = _quads(np.empty((0, 3)), np.empty((0, 4), int)) if None in sizes else build(*sizes, *segments)
     return _along(solid, _SPINE[axis])
-
-
-@lru_cache(maxsize=_MOST_KEPT)
-def _round(build: Callable[..., Polygons], axis: str, sizes: tuple[float, ...], segments: int) -> Polygons:
-    return _along(build(*sizes, segments=segments), _SPINE[axis])
 
 
 def _elements(polygons: Polygons) -> Elements:
