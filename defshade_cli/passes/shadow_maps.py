@@ -75,13 +75,12 @@ class MapRequest:
 class Maps:
     """The maps of an atlas, slot by slot.
 
-    clips: (4, 4) each, transposed.  deeper: the same for coarser casters.  casters: empty where all cast.
+    clips: (4, 4) each, transposed.  casters: empty where all cast.
     coarse_share: as in MapRequest.  levels: (M, D) how coarse each map takes its coarser casters.
     """
 
     cameras: Sequence[Camera]
     clips: Sequence[NDArray[np.float32]]
-    deeper: Sequence[NDArray[np.float32]]
     casters: NDArray[Any]
     resolution: int
     coarse_share: float
@@ -93,9 +92,8 @@ class Maps:
         side, share = request.resolution, request.coarse_share
         cameras = placed(request.cameras, side, request.jitter)
         clips = [clip_from_relative(camera).T.astype(np.float32) for camera in cameras]
-        deeper = [deeper_from_relative(camera, side, share).T.astype(np.float32) for camera in cameras]
         casters = np.repeat(request.casters, request.count) if len(request.casters) else np.array([])
-        return cls(cameras, clips, deeper, casters, side, share, coarse_levels(draws, cameras, side, share))
+        return cls(cameras, clips, casters, side, share, coarse_levels(draws, cameras, side, share))
 
     def are_alike(self, others: Maps | None) -> bool:
         """Do they see the same geometry alike?"""
@@ -104,6 +102,10 @@ class Maps:
         alike = all(np.array_equal(a, b) for a, b in zip(self.clips, others.clips, strict=True))
         as_coarse = np.array_equal(self.levels, others.levels)
         return alike and as_coarse and np.array_equal(self.casters, others.casters)
+
+    def deeper(self, slot: int) -> NDArray[np.float32]:
+        """(4, 4), transposed: as `clips`, for coarser casters."""
+        return deeper_from_relative(self.cameras[slot], self.resolution, self.coarse_share).T.astype(np.float32)
 
     def clip_of(self, slot: int, region: Region | None) -> NDArray[np.floating]:
         """(4, 4), transposed: what sees a part of a map, or all of it."""

@@ -179,8 +179,8 @@ class ShadowPass:
 
 
 def _set_map(turn: _Turn, maps: Maps, slot: int) -> None:
-    program, clips = turn.program, maps.deeper if turn.coarse else maps.clips
-    program["clip_from_relative"] = tuple(clips[slot].ravel().tolist())
+    program, clip = turn.program, maps.deeper(slot) if turn.coarse else maps.clips[slot]
+    program["clip_from_relative"] = tuple(clip.ravel().tolist())
     if "towards_light" in program:
         program["towards_light"] = _towards(maps.cameras[slot])
     if "first_caster" in program:

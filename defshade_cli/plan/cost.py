@@ -34,18 +34,26 @@ _LARGEST = 1e5
 
 
 def choose_lighting(
-    lights: Sequence[PlannedLight], camera: Camera, settings: RenderSettings, layers: Sequence[str], pixels: int
+    lights: Sequence[PlannedLight],
+    camera: Camera,
+    settings: RenderSettings,
+    layers: Sequence[str],
+    pixels: int,
+    *,
+    shadows: bool,
 ) -> Lighting:
-    """pixels: of the image. The layer lightComplexity counts volumes, so it has them where nothing is asked."""
+    """pixels: of the image.  shadows: does some light cast any?
+
+    The layer lightComplexity counts volumes, so it has them where nothing is asked.
+    """
     if settings.lighting != "auto":
         return settings.lighting
     if "lightComplexity" in layers:
         return "volumes"
     covered, count = covered_share(lights, camera), sum(planned.points for planned in lights)
-    shaded = settings.shadows and any(planned.light.casts_shadow for planned in lights)
     costs: dict[Lighting, float] = {
         "volumes": VOLUME * covered,
-        "tiles": TILE_PIXEL * _count_kinds(lights, settings) + TILE_LIGHT * covered * (ARRIVING if shaded else 1.0),
+        "tiles": TILE_PIXEL * _count_kinds(lights, settings) + TILE_LIGHT * covered * (ARRIVING if shadows else 1.0),
         "whole": WHOLE_DRAW * math.ceil(count / LIGHTS_A_DRAW) + WHOLE_LIGHT * count,
     }
     if pixels * settings.most_samples < _WORTHWHILE:

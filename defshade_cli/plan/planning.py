@@ -73,7 +73,7 @@ def make_plan(scene: Scene, settings: RenderSettings) -> Plan:
         planes=planes,
         data_planes=data_planes,
         lights=lights,
-        lighting=choose_lighting(lights, camera, settings, layers, window.width * window.height),
+        lighting=choose_lighting(lights, camera, settings, layers, window.width * window.height, shadows=shadows),
         shadows=shadows,
         shadow_linked=shadows and scene.shadow_linked,
         lobe_rays=rays_a_sample(settings) if any(planned.by_rays for planned in lights) else 0,

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from defshade_cli.dataclass import dataclass
 from defshade_cli.scene.closed import first_of_equal, is_closed
 from defshade_cli.scene.geometry import Mesh
+from defshade_cli.spaces import cross
 
 INSTALL = "pip install 'defshade[meshoptimizer]'"
 
@@ -102,7 +103,7 @@ def _seamed(mesh: Mesh) -> _Seamed:
 def _normals(points: NDArray[np.float32], triangles: Triangles) -> NDArray[np.float32]:
     """(T, 3), twice as long as the triangles' areas."""
     a, b, c = (points[corner] for corner in triangles.T)
-    return np.asarray(np.cross(b - a, c - a))
+    return np.asarray(cross(b - a, c - a))
 
 
 def _lengths(vectors: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -115,7 +115,8 @@ class Traversal:
             return (), here
         if is_instance and not _is_rigged_from_above(prim, here):
             instances.add(prim, here)
-            self._tell_of_unshown(prim)
+            if self._memory.shown:
+                self._tell_of_unshown(prim)
             return (), here
         if said.is_leaf and not is_instance:
             return (), here
