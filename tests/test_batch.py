@@ -18,6 +18,8 @@ import numpy as np
 import pytest
 
 from defshade_cli.cli.batch import batch
+from defshade_cli.cli.options import Reporting
+from defshade_cli.cli.tally import Tally
 from defshade_cli.errors import UsageError
 from defshade_cli.farm.batch import run_batch
 from defshade_cli.farm.local import LocalEngine
@@ -277,3 +279,11 @@ def test_progress_speaks_the_farms_languages() -> None:
     ]
     assert {event["event"] for event in events} == {"started", "frame", "frame_failed", "failed"}
     assert events[-1]["done"] == 2
+
+
+def test_frames_that_failed_alike_are_named_in_order() -> None:
+    """Whichever of them a worker was done with first."""
+    tally = Tally([], Reporting(quiet=True))
+    for frame in (2.0, 3.0, 1.0):
+        tally.add(Outcome(Chunk(RenderJob(Path("a.usda"), (frame,))), frame, error="no light"))
+    assert "3 frames of a.usda failed, 1 to 3: no light" in tally.summary

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -102,6 +103,7 @@ def _failures(outcomes: Iterable[Outcome]) -> Iterator[str]:
     for outcome in outcomes:
         alike[outcome.stage, outcome.error].append(outcome)
     for (stage, error), those in alike.items():
+        those.sort(key=lambda outcome: -math.inf if outcome.frame is None else outcome.frame)
         first, last = (frame_name(outcome.frame) for outcome in (those[0], those[-1]))
         several = f"{len(those)} frames of {stage} failed, {first} to {last}: {error}"
         yield failure(those[0]) if len(those) == 1 else several
